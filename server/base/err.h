@@ -44,6 +44,7 @@ pal_err pal_diagnostic_set(pal_diagnostic *diag, pal_err err, const char *format
  * 0 */
 pal_err pal_diagnostic_prefix(pal_diagnostic *diag, pal_err err, const char *name);
 
+/* the sentence of a refusal: return PAL_REFUSE(diag, "...", ...); */
 #define PAL_REFUSE(diag, ...) pal_diagnostic_set(diag, PAL_ERR_REFUSED, __VA_ARGS__)
 
 #define PAL_TRY(call)                                                                                                  \

@@ -56,11 +56,11 @@ void pal_hub_status_plan(const pal_hub_room *room, const pal_frame *f, pal_wire_
         *to = (pal_wire_part_state){.part = (uint32_t)p,
                                     .frozen = part->frozen,
                                     .asleep = part->asleep,
-                                    .n_safeguard = part->n_safeguard,
-                                    .safeguard_ms = (double)part->safeguard_ns * 1e-6};
+                                    .n_safeguard = pal_safeguards_sum(&part->safeguards),
+                                    .safeguard_ms = (double)part->safeguards.ns * 1e-6};
         if (part->frozen) pal_plain_text(to->reason, sizeof to->reason, part->reason);
         w->frozen |= part->frozen;
-        w->n_state += part->frozen || part->asleep || part->n_safeguard > 0;
+        w->n_state += part->frozen || part->asleep || pal_safeguards_sum(&part->safeguards) > 0;
     }
     w->n_unobserved = room->n_unobserved;
 }

@@ -109,7 +109,7 @@ static bool find_frequencies(const fem_beam *b, int n, double hz[])
     if (!good) return false;
     row->effect->tangent->linearise(row->self, body);
     pal_block_matrix_zero(&k);
-    row->effect->tangent->assemble(row->self, body, 1, 0, &k);
+    row->effect->tangent->assemble(row->self, 1, &k);
     good = !pal_cholesky_create(&k, body->support, &factor) && !pal_cholesky_factor(factor, &k, false);
     for (int m = 0; m < MODES; m++) {
         mode[m] = calloc(3 * (size_t)body->n_node, sizeof(double));

@@ -7,12 +7,9 @@
 #include <glob.h>
 
 static const char readme[] = "server/scene/README.md";
-static const char *const sources[] = {"server/sim/models/*.c",
-                                      "server/sim/solvers/*.c",
-                                      "server/sim/effects/*.c",
-                                      "server/sim/implicit/implicit_solver.c",
-                                      "server/sim/contact/rest_region.c",
-                                      "server/sim/springs/spring_law.c",
+static const char *const sources[] = {"server/sim/models/*.c",        "server/sim/solvers/*.c",
+                                      "server/sim/effects/*.c",       "server/sim/implicit/implicit_solver.c",
+                                      "server/sim/core/definition.c", "server/sim/springs/spring_law.c",
                                       "server/sim/elements/*.c"};
 
 /* text of the file, zero at its end; NULL: cannot be read */

@@ -1,7 +1,7 @@
 /* A live switch (server/sim/transfer/transfer.h) in detail: momentum, forces that are let go, hashes, drift, grips,
  * loads, levels of surfaces, refusals. --table prints figures; --sweep N pulls a surface that adapts through nineteen
  * switches at random, with N seeds, and asserts nothing. */
-#include "server/sim/world/blend_component.h"
+#include "server/sim/world/inserted_components.h"
 #include "tests/stability/hard_case.h"
 #include "tests/stability/switch_levels.h"
 

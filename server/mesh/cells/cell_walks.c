@@ -38,11 +38,20 @@ pal_err pal_cells_find_topology(const pal_cells *c, pal_cells_topology *out)
     return PAL_ERR_OK;
 }
 
-/* the corner from which a fan of triangles covers the face best */
-static int fan_corner(const pal_cells *c, int32_t face)
+/* the use of a face by the one cell beside it that is there, -1: none or both are; away NULL: all cells are there */
+static int32_t open_use(const pal_cells *c, const bool *away, int32_t face)
 {
-    int32_t first, n = pal_cells_face_loop(c, face, &first);
-    double area[3], part[3], best = -INFINITY;
+    const int32_t *use = c->face[face].use;
+    bool there[2];
+    for (int k = 0; k < 2; k++) there[k] = use[k] >= 0 && !(away && away[c->face_use[use[k]].cell]);
+    return there[0] == there[1] ? -1 : use[there[1]];
+}
+
+/* the corner from which a fan of triangles covers the face best, as the cell of a use of n corners sees it */
+static int fan_corner(const pal_cells *c, int32_t use, int32_t first, int32_t n)
+{
+    const int32_t face = c->face_use[use].face;
+    double area[3], part[3], best = -INFINITY, side = c->face[face].use[0] == use ? 1 : -1;
     int corner = 0;
     if (n == 3) return 0;
     pal_cells_face_area(c, NULL, face, area);
@@ -52,7 +61,7 @@ static int fan_corner(const pal_cells *c, int32_t face)
             pal_normal3(part, c->x + 3 * (size_t)c->edge_use[first + i].vertex,
                         c->x + 3 * (size_t)c->edge_use[first + (i + k) % n].vertex,
                         c->x + 3 * (size_t)c->edge_use[first + (i + k + 1) % n].vertex);
-            worst = fmin(worst, pal_dot3(part, area));
+            worst = fmin(worst, side * pal_dot3(part, area));
         }
         if (n == 4 && worst > 0) {
             /* of the two best cuts of a quad, the shorter diagonal */
@@ -65,12 +74,14 @@ static int fan_corner(const pal_cells *c, int32_t face)
     return corner;
 }
 
-static void write_triangles(const pal_cells *c, const int32_t *number, pal_surface *s, int32_t *face)
+static void write_triangles(const pal_cells *c, const bool *away, const int32_t *number, pal_surface *s, int32_t *face)
 {
     int32_t at = 0;
     for (int32_t f = 0; f < c->n_face; f++) {
-        if (!pal_cells_face_boundary(c, f)) continue;
-        int32_t first, n = pal_cells_face_loop(c, f, &first), i = fan_corner(c, f);
+        const int32_t use = open_use(c, away, f);
+        if (use < 0) continue;
+        const int32_t first = c->face_use[use].first_use, n = c->face_use[use + 1].first_use - first,
+                      i = fan_corner(c, use, first, n);
         for (int32_t k = 1; k + 1 < n; k++, at++) {
             int32_t *tri = s->tri + 3 * (size_t)at;
             tri[0] = number[c->edge_use[first + i].vertex];
@@ -81,30 +92,40 @@ static void write_triangles(const pal_cells *c, const int32_t *number, pal_surfa
     }
 }
 
-pal_err pal_cells_boundary(const pal_cells *c, pal_surface *out, int32_t **vertex, int32_t **face)
+/* number [n_vertex] of the vertices of the boundary, ascending, -1: of none; counts vertices and triangles of s */
+static void number_boundary(const pal_cells *c, const bool *away, int32_t *number, pal_surface *s)
+{
+    for (int32_t v = 0; v < c->n_vertex; v++) number[v] = -1;
+    for (int32_t f = 0; f < c->n_face; f++) {
+        const int32_t use = open_use(c, away, f);
+        if (use < 0) continue;
+        const int32_t first = c->face_use[use].first_use, end = c->face_use[use + 1].first_use;
+        for (int32_t k = first; k < end; k++) number[c->edge_use[k].vertex] = 0;
+        s->n_tri += end - first - 2;
+    }
+    for (int32_t v = 0; v < c->n_vertex; v++)
+        if (number[v] == 0) number[v] = s->n_vertex++;
+}
+
+pal_err pal_cells_boundary_of(const pal_cells *cells, const bool *away, pal_surface *out, int32_t **vertex,
+                              int32_t **face)
 {
     pal_surface s = {0};
-    for (int32_t v = 0; v < c->n_vertex; v++) s.n_vertex += c->vertex_boundary[v];
-    for (int32_t f = 0; f < c->n_face; f++) {
-        int32_t first;
-        if (pal_cells_face_boundary(c, f)) s.n_tri += pal_cells_face_loop(c, f, &first) - 2;
-    }
     pal_err err = PAL_ERR_OK;
     int32_t *number, *old, *of;
+    PAL_ARRAY(&err, number, c->n_vertex);
+    if (!err) number_boundary(c, away, number, &s);
     PAL_ARRAY(&err, s.x, 3 * (size_t)s.n_vertex);
     PAL_ARRAY(&err, s.tri, 3 * (size_t)s.n_tri);
-    PAL_ARRAY(&err, number, c->n_vertex);
     PAL_ARRAY(&err, old, s.n_vertex);
     PAL_ARRAY(&err, of, s.n_tri);
     if (!err) {
-        int32_t n = 0;
         for (int32_t v = 0; v < c->n_vertex; v++) {
-            number[v] = c->vertex_boundary[v] ? n : -1;
-            if (!c->vertex_boundary[v]) continue;
-            pal_copy3(s.x + 3 * (size_t)n, c->x + 3 * (size_t)v);
-            old[n++] = v;
+            if (number[v] < 0) continue;
+            pal_copy3(s.x + 3 * (size_t)number[v], c->x + 3 * (size_t)v);
+            old[number[v]] = v;
         }
-        write_triangles(c, number, &s, of);
+        write_triangles(c, away, number, &s, of);
         *out = s;
         if (vertex) *vertex = old, old = NULL;
         if (face) *face = of, of = NULL;
@@ -112,4 +133,9 @@ pal_err pal_cells_boundary(const pal_cells *c, pal_surface *out, int32_t **verte
         pal_surface_free(&s);
     }
     return PAL_FREED(err, number, old, of);
+}
+
+pal_err pal_cells_boundary(const pal_cells *cells, pal_surface *out, int32_t **vertex, int32_t **face)
+{
+    return pal_cells_boundary_of(cells, NULL, out, vertex, face);
 }

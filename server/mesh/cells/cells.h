@@ -174,6 +174,9 @@ pal_err pal_cells_find_topology(const pal_cells *cells, pal_cells_topology *out)
  * [n_vertex] and face [n_tri] of the surface say which of the complex each is, the caller frees both (either may be
  * NULL). Closed; crowded where the complex is pinched. MEMORY */
 pal_err pal_cells_boundary(const pal_cells *cells, pal_surface *out, int32_t **vertex, int32_t **face);
+/* the same of the cells that are left without those that are away [n_cell]; n_tri 0: none is left */
+pal_err pal_cells_boundary_of(const pal_cells *cells, const bool *away, pal_surface *out, int32_t **vertex,
+                              int32_t **face);
 
 /* ---- walks ---- */
 

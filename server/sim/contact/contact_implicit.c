@@ -107,7 +107,7 @@ void pal_contact_implicit_begin(pal_contact_implicit *solve, pal_contact_springs
     add_load(solve, 1, solve->force_N, 0, springs->n_row - solve->first);
 }
 
-/* k (d - m) of every contact, active or not; true: other contacts should have been active, by WRONG_SHARE of the
+/* k (d - m) of every contact, active or not; true: other contacts should have been active, by FORCE_SHARE of the
  * forces, and are now. After CHOOSE_ROUNDS solves only a contact that pulls as a whole is changed, by removing springs
  * that pull, so that this ends. In the last of several stages a pull may make up for the push of an earlier one, and
  * stays */
@@ -126,7 +126,7 @@ static bool choose(pal_contact_implicit *solve, double *force_N)
         if (solve->active[i]) pull += fmax(0, -force_N[i]);
     }
     const bool ends = solve->round++ >= CHOOSE_ROUNDS;
-    if (!(ends ? !solve->staged && pull > push : wrong > WRONG_SHARE * push)) return false;
+    if (!(ends ? !solve->staged && pull > push : wrong > FORCE_SHARE * push)) return false;
     for (int i = 0; i < n; i++) {
         solve->active[i] = force_N[i] > 0 && (!ends || solve->active[i]);
         double load = solve->active[i] ? contact[i].k_N_m * contact[i].depth_m : 0;
@@ -159,8 +159,8 @@ static bool settle_across(pal_contact_implicit *solve, double normal_N, double f
     double size = across_now(solve, stretch, force_N), within = size > free ? free / size : 1;
     for (int k = 0; k < 2; k++) along += stretch[k] * load[k], had += load[k] * load[k];
     /* while it slides its force drags tissue no farther than a spring stretched to the limit would */
-    bool sticks = solve->slides && along < (1 - WRONG_SHARE) * free * sqrt(had);
-    bool slips = !solve->slides && size > (1 + WRONG_SHARE) * free;
+    bool sticks = solve->slides && along < (1 - FORCE_SHARE) * free * sqrt(had);
+    bool slips = !solve->slides && size > (1 + FORCE_SHARE) * free;
     pal_set3(solve->next_slip_m, 0, 0, 0);
     for (int k = 0; k < 2; k++) pal_axpy3(solve->next_slip_m, within * stretch[k], solve->t[k]);
     solve->next_slides = size > free && !sticks;

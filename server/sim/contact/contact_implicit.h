@@ -7,13 +7,13 @@
  * across the mean direction, as stiff as all contacts together, on the load-weighted mean of the points; beyond
  * friction times the normal force they become that constant force.
  *
- * Where the solve leaves more than the caps (tool_force.h), all springs of the tool become constant forces shortened to
- * the caps and the solver solves once more (pal_tangent.settle). Tissue then moves less than before, so never past the
- * proxy. A sub-step ends on the forces that it was solved with, and the tool feels those. Thread: [sim]. */
+ * Where the solve leaves more than the caps (pal_tool_force_share), all springs of the tool become constant forces
+ * shortened to the caps and the solver solves once more (pal_tangent.settle). Tissue then moves less than before, so
+ * never past the proxy. A sub-step ends on the forces that it was solved with, and the tool feels those. Thread: [sim].
+ */
 #ifndef PAL_SIM_CONTACT_CONTACT_IMPLICIT_H
 #define PAL_SIM_CONTACT_CONTACT_IMPLICIT_H
 #include "server/sim/contact/contact_spring.h"
-#include "server/sim/contact/tool_force.h"
 
 /* points of one tool; of more, every second, third ... stands for its neighbours */
 enum { PAL_CONTACT_IMPLICIT_MAX = 512 };

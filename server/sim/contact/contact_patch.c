@@ -16,7 +16,7 @@ static pal_contact_patch_track *find_track(pal_contact_patches *patches, const b
                                            const pal_contact_group *group)
 {
     int best = -1;
-    double best_cosine = M_SQRT1_2;
+    double best_cosine = PAL_SAME_COSINE;
     for (int i = 0; i < PAL_CONTACT_PATCH_MAX; i++) {
         if (taken[i] || !patches->track[i].used) continue;
         double cosine = pal_dot3(patches->track[i].normal, group->normal);

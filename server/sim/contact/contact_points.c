@@ -176,23 +176,13 @@ void pal_contact_points_update(pal_contact_points *points, const pal_body *body,
     points->dt_s = dt_s;
 }
 
-static void interpolate(const pal_contact_points *points, int point, const double *from, double out[3])
+void pal_contact_points_at(const pal_contact_points *points, int point, const double *from, double out[3])
 {
     int32_t vertex[3];
     double share[3];
     int n = pal_contact_samples_corners(&points->sample, point, vertex, share);
     pal_set3(out, 0, 0, 0);
     for (int k = 0; k < n; k++) pal_axpy3(out, share[k], from + 3 * (size_t)vertex[k]);
-}
-
-void pal_contact_points_position(const pal_contact_points *points, int point, double x[3])
-{
-    interpolate(points, point, points->x, x);
-}
-
-void pal_contact_points_velocity(const pal_contact_points *points, int point, double v[3])
-{
-    interpolate(points, point, points->v, v);
 }
 
 /* a point of display.shown, vertex or sample */
@@ -352,6 +342,16 @@ double pal_contact_points_assemble(pal_contact_points *points, const pal_body *b
 {
     pal_contact_points_from_slots(points, body, points->force);
     return pal_contact_points_max_force_N(points);
+}
+
+double pal_tool_force_share(const pal_body *body, const pal_tool *tool, const double force_N[3], double max_node_N)
+{
+    /* |g + s f|^2 <= cap^2, g the force so far */
+    double cap = tool->force_cap_N * tool->ramp, share = 1;
+    double a = pal_dot3(force_N, force_N), b = pal_dot3(tool->force_N, force_N);
+    double c = pal_dot3(tool->force_N, tool->force_N) - cap * cap;
+    if (a > 0 && a + 2 * b + c > 0) share = c >= 0 ? 0 : fmin(fmax((-b + sqrt(b * b - a * c)) / a, 0), 1);
+    return body->load_cap_N > 0 && max_node_N > body->load_cap_N ? fmin(share, body->load_cap_N / max_node_N) : share;
 }
 
 /* motion of a point along `away` when the slots move as in `state` */

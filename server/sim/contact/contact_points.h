@@ -58,8 +58,8 @@ int pal_contact_points_collect(pal_contact_points *points, const pal_body *body,
 /* positions and velocities of the live vertices in a sub-step of dt_s; updates the live frames of a skin. A velocity is
  * the displacement since the sub-step before over its time, of an adaptive body that of the node */
 void pal_contact_points_update(pal_contact_points *points, const pal_body *body, double dt_s);
-void pal_contact_points_position(const pal_contact_points *points, int point, double x[3]);
-void pal_contact_points_velocity(const pal_contact_points *points, int point, double v[3]);
+/* of a point, with from points->x its position, with points->v its velocity */
+void pal_contact_points_at(const pal_contact_points *points, int point, const double *from, double out[3]);
 
 /* position of the fixed contact point nearest to p and the unit normal of the shown surface there; false: no normal */
 bool pal_contact_points_nearest(const pal_contact_points *points, const pal_body *body, const double p[3], double at[3],
@@ -102,6 +102,10 @@ double pal_contact_points_max_force_N(const pal_contact_points *points);
 /* Young's modulus, Pa, where it differs from the body's, else 0 [n_vertex]; NULL: nowhere. MEMORY. [load] */
 pal_err pal_contact_points_young(const pal_contact_points *points, const pal_body *body, const pal_body_def *def,
                                  pal_arena *arena, float **out);
+
+/* What caps leave of a force on a tool: the largest s in [0, 1] for which s force_N, beside what the tool feels
+ * already, keeps to its cap at its ramp, and s max_node_N, the largest force on a node, to body->load_cap_N */
+double pal_tool_force_share(const pal_body *body, const pal_tool *tool, const double force_N[3], double max_node_N);
 
 /* nodes that bear shown vertex `vertex` and their weights, sum 1: node [5], weight [5]; returns how many */
 int pal_contact_points_nodes(const pal_body *body, int vertex, int32_t *node, double *weight);

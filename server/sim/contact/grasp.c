@@ -12,7 +12,7 @@ double pal_grasp_reach_m(const pal_grasps *grasps, const pal_tool *tool)
 
 double pal_grasp_stiffness_N_m(const pal_grasps *grasps, double reach_m)
 {
-    return grasps->asked_N_m > 0 ? grasps->asked_N_m : GRASP_STIFFNESS * grasps->young_Pa * reach_m;
+    return grasps->asked_N_m > 0 ? grasps->asked_N_m : TISSUE_RATIO * grasps->young_Pa * reach_m;
 }
 
 void pal_grasp_mean(const pal_grasp *g, const double *p, double mean[3])
@@ -78,13 +78,13 @@ void pal_grasp_publish(pal_grasp *g, pal_tool *tool, double k_N_m, double c_Ns_m
     double on_tissue[3], *k = &g->fit.k_N_m, *K = tool->grasp_k_N_m;
     pal_scale3(on_tissue, -1, g->force);
     pal_stiffness_fit_add(&g->fit, tool->here_m, on_tissue, tool->radius_m);
-    *k = fmax(MIN_STIFFNESS_N_M, fmin(*k, k_N_m));
+    *k = fmax(STIFFNESS_N_M.low, fmin(*k, k_N_m));
     tool->has_grasp = true;
     pal_copy3(tool->grasp_x0_m, tool->here_m);
     pal_copy3(tool->grasp_f0_N, g->force);
     K[1] = K[2] = K[4] = 0;
     K[0] = K[3] = K[5] = *k;
     if (g->implicit && pal_grasp_compliance_series(&g->implicit->compliance, k_N_m, K))
-        *k = fmax(MIN_STIFFNESS_N_M, (K[0] + K[3] + K[5]) / 3);
-    tool->grasp_b_Ns_m = c_Ns_m * *k / fmax(k_N_m, MIN_STIFFNESS_N_M);
+        *k = fmax(STIFFNESS_N_M.low, (K[0] + K[3] + K[5]) / 3);
+    tool->grasp_b_Ns_m = c_Ns_m * *k / fmax(k_N_m, STIFFNESS_N_M.low);
 }

@@ -7,7 +7,6 @@
 #ifndef PAL_SIM_CONTACT_GRASP_H
 #define PAL_SIM_CONTACT_GRASP_H
 #include "server/sim/contact/haptic_stiffness.h"
-#include "server/sim/contact/tool_force.h"
 #include "server/sim/core/effect.h"
 #include "server/sim/surface/adaptive_grasp.h"
 
@@ -66,13 +65,13 @@ struct pal_grasps {
 void pal_grasp_act_explicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *tool, pal_step *step);
 void pal_grasp_act_implicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *tool, pal_step *step);
 /* pal_tangent of the implicit regime */
-void pal_grasp_multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out);
+void pal_grasp_multiply(void *self, const pal_body *body, double k, const double *p, double *out);
 bool pal_grasp_settle(void *self, pal_step *step, const double *moved, bool last);
 
 /* ---- for the regimes ---- */
 
 double pal_grasp_reach_m(const pal_grasps *grasps, const pal_tool *tool);
-/* k as the scene says, or GRASP_STIFFNESS E reach */
+/* k as the scene says, or TISSUE_RATIO E reach */
 double pal_grasp_stiffness_N_m(const pal_grasps *grasps, double reach_m);
 /* weighted mean of p [n_node][3] over the nodes held */
 void pal_grasp_mean(const pal_grasp *g, const double *p, double mean[3]);

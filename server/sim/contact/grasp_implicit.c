@@ -33,10 +33,10 @@ void pal_grasp_act_implicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *to
     pal_grasp_add_force(g, implicit->load, body->load);
 }
 
-void pal_grasp_multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
+void pal_grasp_multiply(void *self, const pal_body *body, double k, const double *p, double *out)
 {
     const pal_grasps *grasps = self;
-    (void)body, (void)c;
+    (void)body;
     for (int t = 0; t < grasps->n_tool; t++) {
         const pal_grasp *g = &grasps->grasp[t];
         if (!g->closed || !g->implicit->pulls || g->implicit->constant) continue;

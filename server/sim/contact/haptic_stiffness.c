@@ -30,7 +30,7 @@ void pal_stiffness_fit_add(pal_stiffness_fit *fit, const double x_m[3], const do
 
 double pal_haptic_stiffness_clamp(double k_N_m)
 {
-    return fmin(fmax(k_N_m, MIN_STIFFNESS_N_M), MAX_STIFFNESS_N_M);
+    return fmin(fmax(k_N_m, STIFFNESS_N_M.low), STIFFNESS_N_M.high);
 }
 
 /* ---- kept answers ---- */
@@ -38,7 +38,7 @@ double pal_haptic_stiffness_clamp(double k_N_m)
 static int find_entry(const pal_haptic_stiffness *known, const pal_contact_group *group)
 {
     int best = -1;
-    double cosine = M_SQRT1_2;
+    double cosine = PAL_SAME_COSINE;
     for (int i = 0; i < PAL_CONTACT_PATCH_MAX; i++) {
         const pal_haptic_stiffness_entry *e = &known->entry[i];
         if (!e->used || e->contact != (group->force_N > 0)) continue;
@@ -58,7 +58,7 @@ bool pal_haptic_stiffness_find(const pal_haptic_stiffness *known, pal_contact_gr
     if (i < 0) return true;
     pal_scale3(change, group->force_N, group->normal);
     pal_axpy3(change, -e->force_N, e->normal);
-    if (known->time_s - e->time_s < STIFFNESS_S * (1 - 1e-9)) return false;
+    if (known->time_s - e->time_s < FOLLOW_S * (1 - 1e-9)) return false;
     return pal_dist3(e->at_m, at_m) > min_m || pal_norm3(change) > FORCE_SHARE * e->force_N ||
            fabs(group->gap_m - e->gap_m) > min_m;
 }
@@ -125,7 +125,7 @@ void pal_haptic_stiffness_contact(pal_haptic_stiffness *known, pal_contact_group
     for (int i = 0; i < m && answer && k > 0; i++)
         lost += turned_N_m(points, body, &contact[row[i] - first], radius_m, group->normal, answer);
     pal_arena_rewind(scratch, used);
-    keep(known, group, at_m, k > 0 ? fmax(MIN_STIFFNESS_N_M, k - lost) : 0);
+    keep(known, group, at_m, k > 0 ? fmax(STIFFNESS_N_M.low, k - lost) : 0);
 }
 
 /* ---- a weighted mean of nodes ---- */

@@ -38,7 +38,7 @@ typedef struct pal_haptic_stiffness {
 } pal_haptic_stiffness;
 
 /* sets group->k_N_m to what is known for it (0: nothing); true: it should be found again, as the tool has moved by more
- * than min_m or the force has changed by FORCE_SHARE, and STIFFNESS_S has passed */
+ * than min_m or the force has changed by FORCE_SHARE, and FOLLOW_S has passed */
 bool pal_haptic_stiffness_find(const pal_haptic_stiffness *known, pal_contact_group *group, const double at_m[3],
                                double min_m);
 /* the largest known stiffness of a contact, at least k_N_m */

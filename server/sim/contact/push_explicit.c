@@ -28,7 +28,7 @@ static void add_friction(pal_push *push, pal_tool_contact *t, const double sum[3
     for (int i = 0; i < t->n_contact; i++) total += pal_norm3(t->contact[i].force);
     for (int i = 0; i < t->n_contact; i++) {
         double v[3];
-        pal_contact_points_velocity(&push->points, t->contact[i].point, v);
+        pal_contact_points_at(&push->points, t->contact[i].point, push->points.v, v);
         pal_axpy3(drift, -pal_norm3(t->contact[i].force) / total, v);
     }
     if (!pal_tool_contact_friction(t, along, stiffness, t->slip)) pal_axpy3(t->slip, dt_s, drift);
@@ -83,7 +83,7 @@ static void press(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step 
     for (int i = 0; i < t->n_contact; i++) {
         pal_contact *c = &t->contact[i];
         double v[3], k = scale * c->k_N_m;
-        pal_contact_points_velocity(&push->points, c->point, v);
+        pal_contact_points_at(&push->points, c->point, push->points.v, v);
         pal_scale3(c->force, fmax(0, k * (c->depth_m - damping_s * pal_dot3(v, c->away))), c->away);
         pal_add3(sum, sum, c->force);
         stiffness += k;
@@ -141,7 +141,7 @@ void pal_push_want(pal_push *push, const pal_body *body, double *bound_N_m)
         t->wanted_1_s2 = 0;
         for (int k = 0; k < t->n_list && t->active; k++) {
             int point = t->list[k];
-            pal_contact_points_position(&push->points, point, x);
+            pal_contact_points_at(&push->points, point, push->points.x, x);
             if (!(pal_dist3(x, t->proxy.x) < (1 + 0.5 * MAX_DEPTH_RADII) * radius)) continue;
             double stiffness =
                 push->regime->pressure_Pa_m(push, body, point, radius) * push->points.sample.area_m2[point];

@@ -4,7 +4,6 @@
 #include "server/base/vec3.h"
 #include "server/sim/contact/push.h"
 #include "server/sim/contact/tuning.h"
-#include "server/sim/core/blend.h"
 
 pal_err pal_push_make_implicit(pal_push *push, pal_build *build)
 {
@@ -49,24 +48,10 @@ static void find_back(const pal_push *push, pal_tool_contact *t, const pal_tool 
             fmax(0, implicit->back_m + BACK_GAIN * (solve->uncapped_N - (1 - FORCE_SHARE) * solve->allowed_N) / k);
 }
 
-/* A proxy that cannot go deeper is moved by tissue in each step, which makes contact explicit again and trembles at 60
- * steps a second. Contact that is stiff enough lets the proxy reach its tool: share is how much stiffer than asked. */
-static void find_stiffening(pal_tool_contact *t, const pal_tool *tool, const pal_body *body, double dt_s)
-{
-    double here[3], depth = 0, radius = tool->radius_m;
-    pal_sub3(here, tool->here_m, body->offset_m);
-    for (int i = 0; i < t->n_contact; i++) depth = fmax(depth, t->contact[i].depth_m);
-    if (depth > t->limits.max_depth_m - SHALLOW_RADII * radius && pal_dist3(here, t->proxy.x) > SHALLOW_RADII * radius)
-        t->share = fmin(MAX_STIFFENING, t->share * (1 + dt_s / STIFFNESS_S));
-    else if (depth < SHALLOW_RADII * radius)
-        t->share = fmax(1, t->share * fmax(0, 1 - dt_s / PAL_BLEND_S));
-}
-
 /* springs of one tool, and the loads they begin with */
 static void begin(pal_push *push, pal_tool_contact *t, const pal_tool *tool, pal_step *step)
 {
     pal_tool_contact_implicit *implicit = t->implicit;
-    find_stiffening(t, tool, step->body, step->dt_s);
     double scale = tool->ramp * t->ramp * t->share * (1 - t->hold.share), move[3], stiffness = 0;
     pal_copy3(implicit->old_side, t->proxy.normal);
     implicit->old_back_m = implicit->back_m;

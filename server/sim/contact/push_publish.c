@@ -17,12 +17,12 @@ static double young_at(const pal_push *push, int point)
     return push->point_Pa[point] > 0 ? (double)push->point_Pa[point] : push->material.young_Pa;
 }
 
-/* IMPLICIT_STIFFNESS 2 E b / (1 - nu^2) over the area of a contact of half-width a, b at least half an element */
+/* TISSUE_RATIO 2 E b / (1 - nu^2) over the area of a contact of half-width a, b at least half an element */
 double pal_push_pressure_of_tissue(const pal_push *push, const pal_body *body, int point, double radius_m)
 {
     if (push->asked_Pa_m > 0) return push->asked_Pa_m;
     double a = 0.5 * radius_m, b = fmax(a, 0.5 * body->edge_m);
-    return IMPLICIT_STIFFNESS * 2 * young_at(push, point) * b /
+    return TISSUE_RATIO * 2 * young_at(push, point) * b /
            ((1 - push->material.poisson * push->material.poisson) * M_PI * a * a);
 }
 
@@ -40,7 +40,7 @@ void pal_push_follow_side(pal_tool_contact *t, const double side_before[3], doub
 {
     double side[3];
     if (!pal_unit3(side, t->total, 0)) return;
-    pal_axpy3(side, 1 / expm1(dt_s / SIDE_S), side_before);
+    pal_axpy3(side, 1 / expm1(dt_s / FOLLOW_S), side_before);
     pal_unit3(t->proxy.normal, side, 1e-9);
 }
 
@@ -103,7 +103,7 @@ void pal_push_publish(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_s
             group[0].force_N = pal_norm3(t->total), group[0].gap_m = 0;
             n = 1;
         }
-        for (int i = 0; i < t->n_list; i++) pal_contact_points_position(&push->points, t->list[i], x + 3 * i);
+        for (int i = 0; i < t->n_list; i++) pal_contact_points_at(&push->points, t->list[i], push->points.x, x + 3 * i);
         while (n < PAL_CONTACT_PATCH_MAX && pal_contact_group_near(t->proxy.x, radius, pal_push_near_m(push, radius), x,
                                                                    t->n_list, group, n, &group[n]))
             n++;

@@ -55,7 +55,7 @@ typedef struct pal_tool_contact {
     double uncapped_N;   /* normal force of the last sub-step before caps */
     bool retriangulated; /* other triangles are drawn since the step before */
     double wanted_1_s2;  /* interpolated: stiffness over mass that the solver made its sub-steps for */
-    double share;        /* of the stiffness that is stable; falls at once, rises slowly; implicit: find_stiffening */
+    double share;        /* of the stiffness that is stable; falls at once, rises slowly; implicit: 1 */
     double total[3];     /* on the tool, this sub-step, this body */
     pal_contact_patches patches;
     pal_contact_blend hold;

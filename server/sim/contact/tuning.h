@@ -33,9 +33,10 @@ enum { STIFFNESS_PASSES = 2 };
 /* m. A patch is published within a radius of the tool, at least within this: a hand at 0.5 m/s is there in 20 ms, a
  * frame and the network. test_tool_push bounds it to 9 to 12 mm */
 #define NEAR_M 0.010
-/* s. Time constant with which a proxy's side follows the direction of its force (test_step_length). At 0.1 ms a tool
- * passes its cap threefold (test_contact_implicit) */
-#define SIDE_S (4 * FRAME_S)
+/* s. Time constant with which a proxy's side follows the direction of its force (test_step_length; at 0.1 ms a tool
+ * passes its cap threefold, test_contact_implicit), and the time from one answer of the compliance to the next for a
+ * patch: slower than frames, faster than a hand */
+#define FOLLOW_S (4 * FRAME_S)
 /* radii. A tool that moved by less is at rest: its stiffness is not found again (0.01 to 0.03 alike,
  * test_contact_implicit). Contact less deep is at its beginning. Path over which a slope is averaged: 5 % longer lags
  * where tissue stiffens (test_tool_push) */
@@ -51,22 +52,15 @@ enum { STIFFNESS_PASSES = 2 };
  * much, below which it fails */
 #define EIGENVALUE_SAFETY 1.3
 
-/* ---- implicit contact (test_contact_implicit, test_contact_rest) ---- */
-
-/* contact over tissue stiffness: tissue gives way 15 times as much as contact */
-#define IMPLICIT_STIFFNESS 15.0
-/* a contact whose proxy is kept from its tool is stiffened by at most so much */
-#define MAX_STIFFENING 8.0
-/* share of an excess over a cap that a proxy is taken back by in a sub-step: half, as tissue follows late */
+/* share of an excess over a cap that a proxy of implicit contact is taken back by in a sub-step: half, as tissue
+ * follows late (at 1 test_contact_solved fails, at 5 a tool at its cap lets go of tissue, test_contact_implicit) */
 #define BACK_GAIN 0.5
-/* share of the pushing forces that springs may pull, or points may come through, and by which friction may pass its
- * limit or fall short of it, without another solve (test_contact_solved) */
-#define WRONG_SHARE 0.05
 
 /* ---- grasps (test_tool_grasp, test_contact_implicit) ---- */
 
-/* stiffness in E times reach: eight times that of the tissue held, so that tissue follows the tool */
-#define GRASP_STIFFNESS 16
+/* stiffness over that of tissue, which gives way so much more: of implicit contact over that of the tissue behind it,
+ * of a grasp over E times its reach, eight times that of the tissue held (test_contact_implicit) */
+#define TISSUE_RATIO 16
 /* shares of m / dt^2 and m / dt that spring and damper of an explicit grasp take of a node's stability */
 #define GRASP_SHARE 0.25
 /* box diagonals. An implicit grasp stretches by no more in FRAME_S, so that a tool that jumps does not strike (at 1
@@ -76,16 +70,15 @@ enum { STIFFNESS_PASSES = 2 };
 /* ---- rendered stiffness (test_contact_implicit, test_tool_push, test_tool_grasp) ---- */
 
 /* N/m. Range of stiffness that devices render */
-#define MIN_STIFFNESS_N_M 10.0
-#define MAX_STIFFNESS_N_M 5000.0
+static const struct {
+    double low, high;
+} STIFFNESS_N_M = {10, 5000};
 /* directions within 75 degrees of its axis belong to a group */
 #define GROUP_COSINE 0.25
 /* radii. Tissue that is farther than the nearest by less counts as near (at 0.5 test_contact_implicit fails) */
 #define NEAREST_RADII 0.2
-/* s. From one answer of the compliance to the next for a patch: slower than frames, faster than a hand. Contact becomes
- * stiffer or softer by a factor e in it (test_step_length) */
-#define STIFFNESS_S 0.05
-/* share of a force that counts as no change: a stiffness is not found again for it, and contact stays so far below a
- * cap, the rest being for what one step adds (at 0.05 test_contact_implicit fails) */
+/* share of a force that counts as no change: a stiffness is not found again for it; springs may pull, points come
+ * through and friction miss its limit by so much without another solve (test_contact_solved); contact stays so far
+ * below a cap, the rest being for what one step adds (at 0.05 test_contact_implicit fails) */
 #define FORCE_SHARE 0.02
 #endif

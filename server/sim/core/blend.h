@@ -6,16 +6,14 @@
 #ifndef PAL_SIM_CORE_BLEND_H
 #define PAL_SIM_CORE_BLEND_H
 
-/* s. Forces of a tool whose client appears or leaves, contact that begins elsewhere, another body or other supports, a
- * brush. Ten frames at 60 Hz: no shown vertex moves by more than a tenth of the difference in a frame
- * (tests/net/test_switch_bound.c) */
+/* s. Forces of a tool whose client appears or leaves, contact that begins elsewhere, a grasp on other nodes, another
+ * body or other supports, a brush. Ten frames at 60 Hz: no shown vertex moves by more than a tenth of the difference in
+ * a frame (tests/net/test_switch_bound.c) */
 #define PAL_BLEND_S (1.0 / 6)
 /* s. The grasp of a tool on another body, until that body's own force is felt. Slow enough that a slider of methods
  * moves no shown vertex by more than a tenth of the displacement in a frame (tests/stability/test_switch_slider.c; 0.4
  * does) */
 #define PAL_BLEND_GRASP_S 0.5
-/* s. The grasp on an adaptive surface after other nodes or another stiffness of the spring (tests/replay) */
-#define PAL_BLEND_GRASP_NODES_S 0.15
 
 /* the share (any number between 0 and 1) after dt_s towards the goal at the rate 1 / duration_s; 0: at once. What is
  * left by rounding counts as nothing */

@@ -3,6 +3,7 @@
 
 #include "server/base/vec3.h"
 #include "server/num/mass_operator.h"
+#include "server/sim/core/sums.h"
 
 #include <math.h>
 #include <string.h>
@@ -85,18 +86,14 @@ double pal_body_kinetic_J(const pal_body *body)
 
 bool pal_body_finite(const pal_body *body)
 {
-    /* 0 * x is 0 for finite x and NaN otherwise, so one sum tells; in lanes, as no addition then waits for another */
-    const int n = body->active ? 0 : 3 * body->n_dof;
-    double sum = 0, lane[8] = {0};
-    int j = 0;
-    for (int k = 0; k < body->n_active && body->active; k++) {
+    const int n = 3 * body->n_dof;
+    double sum = 0;
+    if (!body->active) return pal_copy_finite(n, body->x, NULL) && pal_copy_finite(n, body->v, NULL);
+    /* 0 * x is 0 for finite x and NaN otherwise */
+    for (int k = 0; k < body->n_active; k++) {
         size_t i = 3 * (size_t)body->active[k];
         for (size_t c = 0; c < 3; c++) sum += 0 * body->x[i + c] + 0 * body->v[i + c];
     }
-    for (; j + 8 <= n; j += 8)
-        for (int l = 0; l < 8; l++) lane[l] += 0 * body->x[j + l] + 0 * body->v[j + l];
-    for (; j < n; j++) sum += 0 * body->x[j] + 0 * body->v[j];
-    for (int l = 0; l < 8; l++) sum += lane[l];
     return sum == 0;
 }
 

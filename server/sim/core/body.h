@@ -1,7 +1,7 @@
-/* One body: its unknowns, what acts on them, what is shown of it. A body is filled by a model (model.h), advanced by a
- * solver and read by components. Memory is the world's arena unless a field says otherwise; components borrow pointers
- * into it. Positions and velocities are in the body frame, relative to the mesh's origin_m. Thread: [load] to build,
- * [sim] else. */
+/* One body: its unknowns, what acts on them, what is shown of it. A body is filled by a model (effect_list.h), advanced
+ * by a solver and read by components. Memory is the world's arena unless a field says otherwise; components borrow
+ * pointers into it. Positions and velocities are in the body frame, relative to the mesh's origin_m. Thread: [load] to
+ * build, [sim] else. */
 #ifndef PAL_SIM_CORE_BODY_H
 #define PAL_SIM_CORE_BODY_H
 #include "server/base/arena.h"

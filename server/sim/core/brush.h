@@ -1,6 +1,6 @@
 /* Brushes: forces that a member exerts on a body while sculpting (paper A section 4.1, fig. 9), one for each tool slot,
- * set and ended between steps (brush_components.h, world.h). All brushes of a body are one CONTACT component, `brush`,
- * with memory of its own.
+ * set and ended between steps (inserted_components.h, world.h). All brushes of a body are one CONTACT component,
+ * `brush`, with memory of its own.
  *
  * Force, pressure and lift begin, follow a change and end over PAL_BLEND_S (blend.h) each. A body has brushes
  * when its shown vertices are nodes and its topology is constant. Thread: [sim]; heap only in set and destroy. */

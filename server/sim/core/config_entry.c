@@ -21,8 +21,7 @@ const pal_config_value *pal_entry_find(const pal_config_entry *item, const char 
     return NULL;
 }
 
-static pal_err put(pal_config_entry *item, const char *key, pal_config_value_kind kind, pal_config_value **out,
-                   pal_diagnostic *diag)
+static pal_err put(pal_config_entry *item, const char *key, const pal_config_value *value, pal_diagnostic *diag)
 {
     if (!*key || strlen(key) >= PAL_ENTRY_TEXT)
         return PAL_REFUSE(diag, "%s: key of %zu characters, wanted 1 to %d", item->path, strlen(key),
@@ -30,28 +29,19 @@ static pal_err put(pal_config_entry *item, const char *key, pal_config_value_kin
     if (pal_entry_has(item, key)) return PAL_REFUSE(diag, "%s: key \"%s\" is there twice", item->path, key);
     if (item->n_value == PAL_ENTRY_KEYS) return PAL_REFUSE(diag, "%s: more than %d keys", item->path, PAL_ENTRY_KEYS);
     pal_config_value *v = &item->value[item->n_value++];
-    memset(v, 0, sizeof *v);
+    *v = *value;
     snprintf(v->key, sizeof v->key, "%s", key);
-    v->kind = kind;
-    *out = v;
     return PAL_ERR_OK;
 }
 
 pal_err pal_entry_put_number(pal_config_entry *item, const char *key, double number, pal_diagnostic *diag)
 {
-    pal_config_value *v;
-    PAL_TRY(put(item, key, PAL_VALUE_NUMBER, &v, diag));
-    v->number[0] = number;
-    v->n_number = 1;
-    return PAL_ERR_OK;
+    return put(item, key, &(pal_config_value){.kind = PAL_VALUE_NUMBER, .number = {number}, .n_number = 1}, diag);
 }
 
 pal_err pal_entry_put_bool(pal_config_entry *item, const char *key, bool flag, pal_diagnostic *diag)
 {
-    pal_config_value *v;
-    PAL_TRY(put(item, key, PAL_VALUE_BOOL, &v, diag));
-    v->flag = flag;
-    return PAL_ERR_OK;
+    return put(item, key, &(pal_config_value){.kind = PAL_VALUE_BOOL, .flag = flag}, diag);
 }
 
 pal_err pal_entry_put_text(pal_config_entry *item, const char *key, const char *text, pal_diagnostic *diag)
@@ -59,10 +49,9 @@ pal_err pal_entry_put_text(pal_config_entry *item, const char *key, const char *
     if (strlen(text) >= PAL_ENTRY_TEXT)
         return PAL_REFUSE(diag, "%s.%s: text of %zu characters, at most %d", item->path, key, strlen(text),
                           PAL_ENTRY_TEXT - 1);
-    pal_config_value *v;
-    PAL_TRY(put(item, key, PAL_VALUE_TEXT, &v, diag));
-    snprintf(v->text, sizeof v->text, "%s", text);
-    return PAL_ERR_OK;
+    pal_config_value value = {.kind = PAL_VALUE_TEXT};
+    memcpy(value.text, text, strlen(text));
+    return put(item, key, &value, diag);
 }
 
 pal_err pal_entry_put_numbers(pal_config_entry *item, const char *key, const double *number, int n,
@@ -70,11 +59,9 @@ pal_err pal_entry_put_numbers(pal_config_entry *item, const char *key, const dou
 {
     if (n < 0 || n > PAL_ENTRY_NUMBERS)
         return PAL_REFUSE(diag, "%s.%s: list of %d numbers, at most %d", item->path, key, n, PAL_ENTRY_NUMBERS);
-    pal_config_value *v;
-    PAL_TRY(put(item, key, PAL_VALUE_NUMBERS, &v, diag));
-    if (n > 0) memcpy(v->number, number, (size_t)n * sizeof *number);
-    v->n_number = n;
-    return PAL_ERR_OK;
+    pal_config_value value = {.kind = PAL_VALUE_NUMBERS, .n_number = n};
+    if (n > 0) memcpy(value.number, number, (size_t)n * sizeof *number);
+    return put(item, key, &value, diag);
 }
 
 /* *out is NULL when the key is absent */

@@ -8,9 +8,6 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* the sentence of a refusal: return PAL_REFUSE(diag, "...", ...); */
-#define PAL_REFUSE(diag, ...) pal_diagnostic_set(diag, PAL_ERR_REFUSED, __VA_ARGS__)
-
 enum { PAL_ENTRY_KEYS = 32, PAL_ENTRY_NUMBERS = 16, PAL_ENTRY_TEXT = 64 };
 
 typedef enum pal_config_value_kind {

@@ -64,7 +64,7 @@ pal_err pal_material_check(pal_material *material, pal_diagnostic *diag)
     } range[] = {{"young_Pa", material->young_Pa, PAL_YOUNG_MIN_PA, PAL_YOUNG_MAX_PA},
                  {"poisson", material->poisson, PAL_POISSON_MIN, PAL_POISSON_MAX},
                  {"density_kg_m3", material->density_kg_m3, PAL_DENSITY_MIN_KG_M3, PAL_DENSITY_MAX_KG_M3},
-                 {"damping_1_s", material->damping_1_s, 0, PAL_DAMPING_MAX_1_S}};
+                 {"damping_1_s", material->damping_1_s, 0, PAL_NUMBER_MAX}};
     for (size_t i = 0; i < sizeof range / sizeof range[0]; i++)
         if (!(range[i].value >= range[i].low && range[i].value <= range[i].high))
             return PAL_REFUSE(diag, "material.%s: %g is outside [%g, %g]", range[i].key, range[i].value, range[i].low,
@@ -102,21 +102,23 @@ void pal_support_mark_fixed(const pal_support_def *support, const double up[3], 
     }
 }
 
+pal_err pal_support_read(pal_config_entry *entry, pal_support_def *out, pal_diagnostic *diag)
+{
+    const bool low = pal_entry_has(entry, "low_m"), high = pal_entry_has(entry, "high_m");
+    *out = (pal_support_def){.lowest = !low && !high, .fraction = 0.05};
+    if (!out->lowest && pal_entry_has(entry, "lowest"))
+        return PAL_REFUSE(diag, "%s: either low_m and high_m or lowest", entry->path);
+    if (low != high) return PAL_REFUSE(diag, "%s: low_m and high_m belong together", entry->path);
+    PAL_TRY(pal_entry_read_numbers(entry, "low_m", 3, out->low_m, diag));
+    PAL_TRY(pal_entry_read_numbers(entry, "high_m", 3, out->high_m, diag));
+    return pal_entry_read_number(entry, "lowest", 0, 1, &out->fraction, diag);
+}
+
 bool pal_support_of_effect(const pal_config_entry *effect, pal_support_def *out)
 {
     pal_config_entry read = *effect;
-    double low[3], high[3];
-    *out = (pal_support_def){.lowest = true, .fraction = 0.05};
     if (strcmp(effect->name, "moving_support") != 0 && strcmp(effect->name, "penalty") != 0) return false;
-    if (pal_entry_has(effect, "low_m") && !pal_entry_read_numbers(&read, "low_m", 3, low, NULL) &&
-        !pal_entry_read_numbers(&read, "high_m", 3, high, NULL)) {
-        out->lowest = false;
-        pal_copy3(out->low_m, low);
-        pal_copy3(out->high_m, high);
-    } else {
-        (void)pal_entry_read_number(&read, "lowest", 0, 1, &out->fraction, NULL);
-    }
-    return true;
+    return pal_support_read(&read, out, NULL) == PAL_ERR_OK;
 }
 
 void pal_body_def_mark_fixed(const pal_body_def *def, const double up[3], const double *x, int n, uint8_t *fixed)
@@ -250,7 +252,7 @@ pal_err pal_scene_check(const pal_scene *scene, pal_diagnostic *diag)
     for (int i = 0; i < scene->n_body; i++) PAL_TRY(check_body(scene, i, diag));
     for (int i = 0; i < scene->n_tool; i++) {
         const pal_tool_def *tool = &scene->tool[i];
-        if (!(tool->radius_m >= 0 && tool->radius_m <= PAL_LENGTH_MAX_M))
+        if (!(tool->radius_m >= 0 && tool->radius_m <= PAL_NUMBER_MAX))
             return PAL_REFUSE(diag, "tools[%d].radius_m: %g is not a radius", i, tool->radius_m);
         if (!(tool->force_cap_N > 0 && tool->force_cap_N <= 1e9))
             return PAL_REFUSE(diag, "tools[%d].force_cap_N: %g is outside (0, 1e9]", i, tool->force_cap_N);

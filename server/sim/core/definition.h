@@ -54,8 +54,8 @@ typedef struct pal_support_def {
 
 /* A stroke of a soft brush over the material at rest (painting, paper A section 4.1; model subdivision_fem). Within
  * radius_m of at_m, Young's modulus and density are multiplied by factor^w; w is 1 up to (1 - softness) radius_m and
- * falls smoothly to 0 at radius_m. Strokes multiply. Ranges: factors PAL_STROKE_FACTOR_MIN to _MAX, softness 0 to 1,
- * radius_m above 0 */
+ * falls smoothly to 0 at radius_m. Strokes multiply. Ranges: factors 1 / PAL_STROKE_FACTOR_MAX to
+ * PAL_STROKE_FACTOR_MAX, softness 0 to 1, radius_m above 0 */
 typedef struct pal_stroke {
     double at_m[3], radius_m, softness; /* body frame, rest shape */
     double young_factor, density_factor;
@@ -124,7 +124,10 @@ void pal_body_default_cells(pal_body_def *body, const char *name, const pal_prep
 void pal_tools_default(pal_scene *scene, int n_tool);
 /* fixed [n] = 1 for the points x [n][3] (body frame) in the box or lowest part of the support; rim: none */
 void pal_support_mark_fixed(const pal_support_def *support, const double up[3], const double *x, int n, uint8_t *fixed);
-/* the part of the body that an effect supports (moving_support, penalty); false: it supports nothing */
+/* reads the part that an effect supports: keys low_m and high_m (a box, body frame) or lowest (share of the body's
+ * height along `up`, 0.05); REFUSED */
+pal_err pal_support_read(pal_config_entry *entry, pal_support_def *out, pal_diagnostic *diag);
+/* the part of the body that an effect supports (moving_support, penalty); false: it supports nothing, or is refused */
 bool pal_support_of_effect(const pal_config_entry *effect, pal_support_def *out);
 /* fixed [n] = 1 for all points that the body's supports, rims excepted, and its effects support */
 void pal_body_def_mark_fixed(const pal_body_def *def, const double up[3], const double *x, int n, uint8_t *fixed);

@@ -59,24 +59,24 @@ typedef struct pal_build {
     int n_made;
 } pal_build;
 
-/* What implicit solvers ask of FORCE and CONTACT components: stiffness K = -df/dx and damping C = -df/dv, symmetric,
- * evaluated by `linearise` and constant until the next one. K is positive semi-definite or is made so. FORCE components
- * have linearise and multiply; every other member may be NULL. [sim] unless stated */
+/* What implicit solvers ask of FORCE and CONTACT components: the stiffness K = -df/dx, symmetric, evaluated by
+ * `linearise` and constant until the next one, positive semi-definite or made so. FORCE components have multiply; every
+ * other member may be NULL. [sim] unless stated */
 typedef struct pal_tangent {
     /* nodes that the component couples, for the pattern of an assembled matrix, to which assemble adds; NULL or false:
      * it is applied by multiply only, as contact is. [load], after make */
     bool (*couple)(void *self, pal_cliques *out);
-    /* evaluates K and C at the body's current d and, for CONTACT, at the loads given in this sub-step */
+    /* evaluates K at the body's current d and, for CONTACT, at the loads given in this sub-step */
     void (*linearise)(void *self, const pal_body *body);
-    /* out += (k K + c C) p, p and out [n_node][3] */
-    void (*multiply)(void *self, const pal_body *body, double k, double c, const double *p, double *out);
-    /* to += k K + c C, in the pattern made with couple; not called for a body with interpolation */
-    void (*assemble)(void *self, const pal_body *body, double k, double c, pal_block_matrix *to);
+    /* out += k K p, p and out [n_node][3] */
+    void (*multiply)(void *self, const pal_body *body, double k, const double *p, double *out);
+    /* to += k K, in the pattern made with couple; not called for a body with interpolation */
+    void (*assemble)(void *self, double k, pal_block_matrix *to);
     /* rotation [n_node][9] += rotation of the material around each node at the last linearise, weighted by stiffness
      * (by volume, a preconditioner turned with soft material would stretch stiff material next to it). NULL: no
      * rotations
      */
-    void (*rotate)(void *self, const pal_body *body, double *rotation);
+    void (*rotate)(void *self, double *rotation);
     /* CONTACT, after a stage that moved the nodes by `moved` [n_node][3], m, since the loads were given (fixed and
      * prescribed nodes too). last: the stage ends the sub-step, and the forces on the tools become those it was solved
      * with; before that, only the caps are enforced. True: contact pulled where it can only push, or exceeded a cap, so

@@ -49,11 +49,11 @@ bool pal_copy_finite(int n, const double *from, double *to)
     int i = 0;
     for (; i + 8 <= n; i += 8) {
         const pal_v8 p = pal_load8(from + i);
-        *(pal_v8_unaligned *)(to + i) = p;
+        if (to) *(pal_v8_unaligned *)(to + i) = p;
         a += 0 * p;
     }
     for (; i < n; i++) {
-        to[i] = from[i];
+        if (to) to[i] = from[i];
         sum += 0 * from[i];
     }
     return sum + sum_lanes(a) == 0;

@@ -8,6 +8,6 @@
 double pal_sum_mv2(int n, const double *mass_kg, const double *v);
 /* sum of f.(x - x0) over n numbers, which is NaN when one of f, x, x0 is not finite; J */
 double pal_sum_work(int n, const double *f, const double *x, const double *x0);
-/* to = from, n numbers; are all of them finite? */
+/* to = from (NULL: only asks), n numbers; are all of them finite? */
 bool pal_copy_finite(int n, const double *from, double *to);
 #endif

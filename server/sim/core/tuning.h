@@ -3,6 +3,8 @@
 #ifndef PAL_SIM_CORE_TUNING_H
 #define PAL_SIM_CORE_TUNING_H
 
+#include <math.h>
+
 /* ---- material: one range for scene keys, regions, problem files, flags and live edits
  * (tests/scene/test_material_limits.c) ---- */
 
@@ -12,25 +14,34 @@
 #define PAL_YOUNG_MAX_PA      1e15
 #define PAL_DENSITY_MIN_KG_M3 1e-24
 #define PAL_DENSITY_MAX_KG_M3 (1 / PAL_DENSITY_MIN_KG_M3)
-/* distance of Poisson's ratio from -1, where the shear modulus is infinite, and from 0.5, where the bulk modulus is. A
- * bulk modulus of 5,000 times the shear modulus is as far as double precision and conjugate gradients go together;
- * larger ratios up to MAX are taken as CLAMP and reported (tests/stability/test_fem_numbers.c) */
-#define PAL_POISSON_MARGIN 1e-4
-#define PAL_POISSON_MIN    (-1 + PAL_POISSON_MARGIN)
-#define PAL_POISSON_CLAMP  (0.5 - PAL_POISSON_MARGIN)
-#define PAL_POISSON_MAX    (0.5 - 0.01 * PAL_POISSON_MARGIN)
-/* 1/s, c/m: faster decay than the shortest sub-step resolves */
-#define PAL_DAMPING_MAX_1_S 1e9
-
-/* ---- sizes ---- */
-
-/* m: positions, radii; a body of this size in mm as a file's unit is still one (tests/scene/test_scene_file.c) */
-#define PAL_LENGTH_MAX_M 1e9
-/* factors of a paint stroke (tests/scene/test_subdivision_scene.c) */
-#define PAL_STROKE_FACTOR_MIN 1e-6
-#define PAL_STROKE_FACTOR_MAX (1 / PAL_STROKE_FACTOR_MIN)
+/* Poisson's ratio: as near to 0.5, where the bulk modulus is infinite, as a bulk modulus of 5,000 times the shear
+ * modulus, which is as far as double precision and conjugate gradients go together; larger ratios up to MAX are taken
+ * as CLAMP and reported. MIN is as near to -1, where the shear modulus is infinite (tests/stability/test_fem_numbers.c)
+ */
+#define PAL_POISSON_CLAMP 0.4999
+#define PAL_POISSON_MIN   (-0.5 - PAL_POISSON_CLAMP)
+#define PAL_POISSON_MAX   0.499999
+/* m, 1/s: positions and radii, of which a body of this size in mm as a file's unit is still one
+ * (tests/scene/test_scene_file.c); drag c/m, whose decay no sub-step resolves (tests/scene/test_material_limits.c) */
+#define PAL_NUMBER_MAX 1e9
+/* factors of a paint stroke, up or down (tests/scene/test_subdivision_scene.c) */
+#define PAL_STROKE_FACTOR_MAX 1e6
 /* nodes of a grid of spring constants */
-#define PAL_SPRING_GRID_NODES_MAX (1 << 20)
+enum { PAL_SPRING_GRID_NODES_MAX = 1 << 20 };
+
+/* ---- sums and loads ---- */
+
+/* relative: a smaller difference of masses, inertias, lengths or areas is rounding of their sums. Springs that are
+ * shorter than so much of their length have no direction, a body smaller than so much of its size is a point
+ * (tests/sim/surface/test_edge_spring.c, test_adaptive_geometry.c) */
+#define PAL_ROUNDING 1e-9
+/* largest factor, up or down, on velocities that restores the energy of a body after a change of its level, and of the
+ * mass of old nodes over that of the new ones which take over their force: beyond it nodes would be thrown
+ * (tests/sim/surface/test_refine.c, tests/stability/test_switch_pairs.c) */
+#define PAL_CHANGE_MAX 2.0
+/* cosine of the largest angle, 45 degrees, between two directions or loads that count as the same one
+ * (tests/sim/contact/test_contact_implicit.c, tests/sim/solvers/test_fem_static.c) */
+#define PAL_SAME_COSINE M_SQRT1_2
 /* largest load on a node is this times E h^2: a strain of the order of 10 in one element, far above any linear answer
  * (tests/sim/world/test_world.c) */
 #define PAL_LOAD_CAP_FACTOR 10
@@ -46,7 +57,7 @@
  * tests/sim/springs/test_spring_recovery.c) */
 #define PAL_FILL_MIN 0.02
 /* cut voxels with less inside are dropped, unless more than MAX_MISSING of the volume would go; then those below
- * PAL_FILL_MIN (tests/sim/core/test_configuration.c) */
+ * PAL_FILL_MIN (tests/sim/core/test_configuration.c, at 0.02 tests/stability/test_switch_ball.c) */
 #define PAL_VOXEL_DROP_FILL   0.25
 #define PAL_VOXEL_MAX_MISSING (PAL_VOXEL_DROP_FILL / 10)
 #endif

@@ -39,10 +39,10 @@ static bool same3(const double a[3], const double b[3])
 pal_err pal_brush_check(const pal_brush *b, pal_diagnostic *diag)
 {
     if (b->kind != PAL_BRUSH_INFLATE && b->kind != PAL_BRUSH_CURVE)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: there is no kind %d", (int)b->kind);
+        return PAL_REFUSE(diag, "brush: there is no kind %d", (int)b->kind);
     bool curve = b->kind == PAL_BRUSH_CURVE;
     if (!pal_finite3(b->at_m) || (curve && (!pal_finite3(b->to_m) || !pal_finite3(b->lift_m))))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: a place or lift_m is no number");
+        return PAL_REFUSE(diag, "brush: a place or lift_m is no number");
     const struct {
         const char *name, *wanted;
         double value, low, high;
@@ -52,11 +52,9 @@ pal_err pal_brush_check(const pal_brush *b, pal_diagnostic *diag)
                  {"stiffness_N_m", "1e-9 to 1e9", curve ? b->stiffness_N_m : 1, 1e-9, 1e9}};
     for (int i = 0; i < 4; i++)
         if (!(range[i].value >= range[i].low && range[i].value <= range[i].high))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: %s %g, wanted %s", range[i].name, range[i].value,
-                                      range[i].wanted);
+            return PAL_REFUSE(diag, "brush: %s %g, wanted %s", range[i].name, range[i].value, range[i].wanted);
     if (curve && same3(b->at_m, b->to_m))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: both ends of the curve are at %g %g %g m", b->at_m[0],
-                                  b->at_m[1], b->at_m[2]);
+        return PAL_REFUSE(diag, "brush: both ends of the curve are at %g %g %g m", b->at_m[0], b->at_m[1], b->at_m[2]);
     return PAL_ERR_OK;
 }
 
@@ -112,8 +110,7 @@ static pal_err fill(const pal_body *body, const pal_brush *b, slot *s, pal_diagn
     double t = 0, sum = 0, max = 0;
     for (int i = 0; i < n; i++) s->n += reach(body, b, i, &t) > 0;
     if (s->n == 0)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: nothing of body \"%s\" is within radius_m %g of it",
-                                  body->name, b->radius_m);
+        return PAL_REFUSE(diag, "brush: nothing of body \"%s\" is within radius_m %g of it", body->name, b->radius_m);
     s->item = PAL_NEW(s->arena, int32_t, s->n);
     s->weight = PAL_NEW(s->arena, double, s->n);
     s->begin = PAL_NEW(s->arena, double, curve ? 3 * (size_t)s->n : 1);
@@ -131,9 +128,8 @@ static pal_err fill(const pal_body *body, const pal_brush *b, slot *s, pal_diagn
     for (int k = 0; k < s->n; k++) s->weight[k] /= sum;
     double limit = body->load_cap_N / body->edge_m * sum / max;
     if (b->stiffness_N_m > limit)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "brush: stiffness_N_m %g, body \"%s\" takes up to %.3g over %d nodes",
-                                  b->stiffness_N_m, body->name, limit, s->n);
+        return PAL_REFUSE(diag, "brush: stiffness_N_m %g, body \"%s\" takes up to %.3g over %d nodes", b->stiffness_N_m,
+                          body->name, limit, s->n);
     return PAL_ERR_OK;
 }
 
@@ -163,10 +159,10 @@ pal_err pal_brush_make(const pal_body *body, pal_arena *arena, pal_diagnostic *d
 {
     if (body->active || body->display.skin || !body->display.surface || !body->display.shown_node ||
         body->display.n_shown == 0)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" has no brushes: %s", body->name,
-                                  body->active         ? "its surface adapts"
-                                  : body->display.skin ? "it is shown by a skin; take output \"surface_output\""
-                                                       : "it shows nothing");
+        return PAL_REFUSE(diag, "body \"%s\" has no brushes: %s", body->name,
+                          body->active         ? "its surface adapts"
+                          : body->display.skin ? "it is shown by a skin; take output \"surface_output\""
+                                               : "it shows nothing");
     *self = PAL_NEW(arena, brushes, 1);
     return *self ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
@@ -176,13 +172,13 @@ pal_err pal_brush_set(void *self, const pal_body *body, int slot_index, const pa
     slot *s = &((brushes *)self)->slot[slot_index], fresh = {.brush = *b};
     PAL_TRY(pal_brush_check(b, diag));
     if (b->kind == PAL_BRUSH_CURVE && !(pal_norm3(b->lift_m) <= 10 * body->length_scale_m))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: lift_m of %g m, body \"%s\" takes up to %g",
-                                  pal_norm3(b->lift_m), body->name, 10 * body->length_scale_m);
+        return PAL_REFUSE(diag, "brush: lift_m of %g m, body \"%s\" takes up to %g", pal_norm3(b->lift_m), body->name,
+                          10 * body->length_scale_m);
     /* 10 E: beyond it node loads are capped, and there are too many sub-steps for real time */
     const double max_Pa = body->load_cap_N / (body->edge_m * body->edge_m);
     if (b->kind == PAL_BRUSH_INFLATE && !(fabs(b->pressure_Pa) <= max_Pa))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: pressure_Pa %g, body \"%s\" takes up to %.3g",
-                                  b->pressure_Pa, body->name, max_Pa);
+        return PAL_REFUSE(diag, "brush: pressure_Pa %g, body \"%s\" takes up to %.3g", b->pressure_Pa, body->name,
+                          max_Pa);
     if (may_continue(s, b)) {
         s->brush = *b;
         s->left_s = PAL_BLEND_S;
@@ -355,19 +351,18 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
         for (int k = 0; k < s->n && s->brush.kind == PAL_BRUSH_CURVE; k++)
             bound_N_m[s->item[k]] += soon * s->brush.stiffness_N_m * s->weight[k];
         const double p = soon * fmax(fabs(s->now[0]), fabs(s->brush.pressure_Pa)) / 6;
-        for (int k = 0; k < 3 * s->n && s->brush.kind == PAL_BRUSH_INFLATE; k++) {
-            const int t = s->item[k / 3];
-            const int32_t node[3] = {corner_node(body, t, k % 3), corner_node(body, t, (k + 1) % 3),
-                                     corner_node(body, t, (k + 2) % 3)};
-            pal_pressure_bound(body->d, node, p * s->weight[k / 3], bound_N_m);
+        for (int k = 0; k < s->n && s->brush.kind == PAL_BRUSH_INFLATE; k++) {
+            const int t = s->item[k];
+            const int32_t node[3] = {corner_node(body, t, 0), corner_node(body, t, 1), corner_node(body, t, 2)};
+            pal_pressure_bound(body->d, node, p * s->weight[k], bound_N_m);
         }
     }
 }
 
-static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
+static void multiply(void *self, const pal_body *body, double k, const double *p, double *out)
 {
     const brushes *row = self;
-    (void)body, (void)c;
+    (void)body;
     for (int i = 0; i < PAL_TOOL_MAX; i++) {
         const slot *s = &row->slot[i];
         for (int n = 0; n < s->n && acts(s) && s->brush.kind == PAL_BRUSH_CURVE; n++)

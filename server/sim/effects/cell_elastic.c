@@ -22,8 +22,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     static const char *const names[] = {[PAL_CELL_POLAR] = "polar", [PAL_CELL_EDGES] = "edges"};
     int operator_kind = PAL_CELL_POLAR;
     if (!solid)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model subdivision_fem",
-                                  item->path, item->name);
+        return PAL_REFUSE(build->diag, "%s: \"%s\" needs a body of model subdivision_fem", item->path, item->name);
     PAL_TRY(pal_entry_read_choice(item, "operator", names, 2, &operator_kind, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     pal_cells_elastic *row = PAL_NEW(build->arena, pal_cells_elastic, 1);
@@ -105,15 +104,14 @@ static void linearise(void *self, const pal_body *body)
     pal_cells_elastic_linearise(row, body->d);
 }
 
-static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
+static void multiply(void *self, const pal_body *body, double k, const double *p, double *out)
 {
-    (void)body, (void)c;
+    (void)body;
     pal_cells_elastic_multiply(self, k, p, out);
 }
 
-static void rotate(void *self, const pal_body *body, double *rotation)
+static void rotate(void *self, double *rotation)
 {
-    (void)body;
     pal_cells_elastic_rotate(self, rotation);
 }
 

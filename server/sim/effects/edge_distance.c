@@ -5,7 +5,6 @@
  * rest direction, so that a body collapsed to a plane or a point opens again. Near inverted tetrahedra the edges are
  * restored as vectors (spring_recovery.h); those forces and that energy belong to this component. */
 #include "server/sim/core/effect_list.h"
-#include "server/sim/effects/tuning.h"
 #include "server/sim/springs/spring_recovery.h"
 
 #include <stdlib.h>
@@ -57,7 +56,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 /* with q = (l/l0)^2 and r = 1/sqrt(q): C (d/l)/l0 = (1 - r) d/l0^2 */
 PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *min)
 {
-    const pal_v8 floor = MIN_Q - (pal_v8){0}, one = 1 - (pal_v8){0};
+    const pal_v8 floor = PAL_ROUNDING * PAL_ROUNDING - (pal_v8){0}, one = 1 - (pal_v8){0};
     pal_v8 dx = pal_load8(p[1][0]) - pal_load8(p[0][0]), dy = pal_load8(p[1][1]) - pal_load8(p[0][1]),
            dz = pal_load8(p[1][2]) - pal_load8(p[0][2]), w2 = w * w;
     pal_v8 q = (dx * dx + dy * dy + dz * dz) * w2, known = pal_select8(w > 0, q, one);
@@ -73,7 +72,7 @@ static void reopen(const pal_spring_set *row, const pal_body *body)
         int a = 3 * row->item[2 * i], b = 3 * row->item[2 * i + 1], lane = row->simd_blocks.place[i];
         double d[3], w = row->w[lane];
         pal_sub3(d, body->d + b, body->d + a);
-        if (pal_dot3(d, d) * w * w >= MIN_Q) continue;
+        if (pal_dot3(d, d) * w * w >= PAL_ROUNDING * PAL_ROUNDING) continue;
         pal_sub3(d, body->x_rest + b, body->x_rest + a);
         double s = row->spring.k_J * row->q[lane] * w * w;
         pal_axpy3(body->f + b, s, d);
@@ -93,7 +92,7 @@ static pal_err run(void *self, pal_step *step)
     pal_node_order_load(body->node_order, body->d);
     double min = pal_spring_run(&e->row, body->node_order, kernel, 2);
     pal_node_order_add(body->node_order, body->f);
-    if (min < MIN_Q) reopen(&e->row, body);
+    if (min < PAL_ROUNDING * PAL_ROUNDING) reopen(&e->row, body);
     if (e->row.n_off > 0) pal_spring_recovery_force(body->recovery, &e->row, body);
     if (e->row.spring.c_Js > 0) pal_spring_damp(&e->row, body, PAL_SPRING_DISTANCE);
     return PAL_ERR_OK;

@@ -13,7 +13,6 @@
  * body->active_nodes, so position and velocity of an end are one load, and a force is one load and one store. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
-#include "server/sim/effects/tuning.h"
 #include "server/sim/surface/active_nodes.h"
 #include "server/sim/surface/adaptive_surface.h"
 
@@ -85,8 +84,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     const pal_adaptive_surface *adaptive = build->body->model.adaptive;
     if (!adaptive)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model adaptive_springs",
-                                  item->path, item->name);
+        return PAL_REFUSE(build->diag, "%s: \"%s\" needs a body of model adaptive_springs", item->path, item->name);
     edge_spring *e = PAL_NEW(build->arena, edge_spring, 1);
     if (!e) return PAL_ERR_MEMORY;
     e->adaptive = adaptive;
@@ -175,7 +173,7 @@ PAL_INLINE void measure_blocks(const edge_spring *e, const double *xv, int first
 /* with q = (l/l0)^2 and r = 1/sqrt(q): k (l - l0) d/l = k (1 - r) d, and c (dv.d)/l^2 d; returns the least q */
 static double run_springs(const edge_spring *e, const pal_active_nodes *pack, double k, double c)
 {
-    const pal_v8 floor = MIN_Q - (pal_v8){0}, none = {0}, one = 1 - none;
+    const pal_v8 floor = PAL_ROUNDING * PAL_ROUNDING - (pal_v8){0}, none = {0}, one = 1 - none;
     pal_v8 min = one;
     const double *xv = (const double *)pack->xv;
     float *f = (float *)pack->f; /* 8 floats are as long as 4 doubles */
@@ -212,7 +210,7 @@ static void reopen(const edge_spring *e, const pal_active_nodes *pack, double k)
         const uint32_t *end = e->end + 2 * (s / PAL_LANES * PAL_LANES) + s % PAL_LANES;
         const uint32_t a = end[0] / PAL_LANES, b = end[PAL_LANES] / PAL_LANES;
         pal_quad d = pal_v8_low(pack->xv[b]) - pal_v8_low(pack->xv[a]);
-        if (!(e->w2[s] > 0) || pal_quad_dot(d, d) * e->w2[s] >= MIN_Q) continue;
+        if (!(e->w2[s] > 0) || pal_quad_dot(d, d) * e->w2[s] >= PAL_ROUNDING * PAL_ROUNDING) continue;
         d = pack->rest[b] - pack->rest[a];
         d[3] = 0;
         pack->f[b] += k * e->q[s] * d;
@@ -225,7 +223,8 @@ static pal_err compute_forces(void *self, pal_step *step)
     edge_spring *e = self;
     take_springs(e);
     double k = e->k_N_m * e->adaptive->spring_ramp;
-    if (run_springs(e, step->body->active_nodes, k, damping_now(e)) < MIN_Q) reopen(e, step->body->active_nodes, k);
+    if (run_springs(e, step->body->active_nodes, k, damping_now(e)) < PAL_ROUNDING * PAL_ROUNDING)
+        reopen(e, step->body->active_nodes, k);
     return PAL_ERR_OK;
 }
 

@@ -4,7 +4,6 @@
  * Departures: errata B2, B3, B5 (true gradients: the paper's sign pushes away from A0 and its equal magnitudes create
  * momentum). Below 1e-9 of its rest area a triangle has no normal and its force fades to nothing. */
 #include "server/sim/effects/spring_effect.h"
-#include "server/sim/effects/tuning.h"
 
 #include <stdlib.h>
 
@@ -27,7 +26,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *min)
 {
     (void)min;
-    const pal_v8 floor = MIN_Q - (pal_v8){0};
+    const pal_v8 floor = PAL_ROUNDING * PAL_ROUNDING - (pal_v8){0};
     pal_v8 x = pal_load8(p[0][0]), y = pal_load8(p[0][1]), z = pal_load8(p[0][2]), w2 = w * w;
     pal_v8 ax = pal_load8(p[1][0]) - x, ay = pal_load8(p[1][1]) - y, az = pal_load8(p[1][2]) - z;
     pal_v8 bx = pal_load8(p[2][0]) - x, by = pal_load8(p[2][1]) - y, bz = pal_load8(p[2][2]) - z;

@@ -32,13 +32,12 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     pal_field kind = pal_field_find(name);
     if (kind == PAL_FIELD_NONE)
-        return pal_diagnostic_set(
-            build->diag, PAL_ERR_REFUSED,
+        return PAL_REFUSE(
+            build->diag,
             "%s: there is no field \"%s\" (displacement, von_mises, energy, stiffness, strain, distortion)", item->path,
             name);
     if (body->display.n_shown == 0 || !body->display.surface)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: the body shows nothing that could be coloured",
-                                  item->path);
+        return PAL_REFUSE(build->diag, "%s: the body shows nothing that could be coloured", item->path);
     field_output *out = PAL_NEW(build->arena, field_output, 1);
     float *value = PAL_NEW(build->arena, float, body->display.n_shown);
     if (!out || !value) return PAL_ERR_MEMORY;

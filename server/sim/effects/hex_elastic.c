@@ -108,10 +108,9 @@ static void linearise(void *self, const pal_body *body)
     (row->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_linearise : pal_hex_corot_linearise)(row, body->node_order);
 }
 
-static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
+static void multiply(void *self, const pal_body *body, double k, const double *p, double *out)
 {
     const pal_elastic_hexes *row = self;
-    (void)c;
     if (row->has_inversion) {
         pal_elastic_tets_multiply(row->split, k, p, out);
         return;
@@ -121,20 +120,18 @@ static void multiply(void *self, const pal_body *body, double k, double c, const
     pal_node_order_add(body->node_order, out);
 }
 
-static void assemble(void *self, const pal_body *body, double k, double c, pal_block_matrix *to)
+static void assemble(void *self, double k, pal_block_matrix *to)
 {
     pal_elastic_hexes *row = self;
-    (void)c, (void)body;
     if (row->has_inversion)
         pal_elastic_tets_assemble(row->split, k, to);
     else
         pal_hex_assemble(row, k, to);
 }
 
-static void rotate(void *self, const pal_body *body, double *rotation)
+static void rotate(void *self, double *rotation)
 {
     const pal_elastic_hexes *row = self;
-    (void)body;
     if (row->has_inversion)
         pal_elastic_tets_rotate(row->split, rotation);
     else

@@ -66,23 +66,20 @@ static pal_err check_surface(inflate *row, const pal_config_entry *item, const p
 {
     const pal_adaptive_surface *adaptive = build->body->model.adaptive;
     if (!adaptive)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model adaptive_springs",
-                                  item->path, item->name);
+        return PAL_REFUSE(build->diag, "%s: \"%s\" needs a body of model adaptive_springs", item->path, item->name);
     const pal_levels *levels = &adaptive->levels;
     int n_open = 0, last = levels->n_level - 1;
     for (int32_t e = 0; e < pal_levels_n_edge(levels, 0); e++) n_open += levels->edge[e].face[1] < 0;
     if (n_open > 0)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
-                                  "%s: \"%s\" needs a closed surface, this one has %d open edges", item->path,
-                                  item->name, n_open);
+        return PAL_REFUSE(build->diag, "%s: \"%s\" needs a closed surface, this one has %d open edges", item->path,
+                          item->name, n_open);
     row->fine_m3 =
         volume(levels->x, levels->face + 3 * (size_t)levels->first_face[last], pal_levels_n_face(levels, last));
     double size = build->body->length_scale_m,
            min_m3 = DBL_EPSILON * pal_levels_n_face(levels, last) * size * size * size;
     if (!(fabs(row->fine_m3) > min_m3))
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
-                                  "%s: the surface encloses %g m3, which cannot be told from nothing", item->path,
-                                  fabs(row->fine_m3));
+        return PAL_REFUSE(build->diag, "%s: the surface encloses %g m3, which cannot be told from nothing", item->path,
+                          fabs(row->fine_m3));
     return PAL_ERR_OK;
 }
 
@@ -202,11 +199,8 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
         int i = pal_body_point(body, n);
         bound_N_m[i] += k * sum * body->mass_kg[i];
     }
-    for (int t = 0; t < adaptive->n_tri && p != 0; t++) {
-        const int32_t *tri = adaptive->tri + 3 * (size_t)t;
-        for (int c = 0; c < 3; c++)
-            pal_pressure_bound(body->d, (int32_t[3]){tri[c], tri[(c + 1) % 3], tri[(c + 2) % 3]}, p / 6, bound_N_m);
-    }
+    for (int t = 0; t < adaptive->n_tri && p != 0; t++)
+        pal_pressure_bound(body->d, adaptive->tri + 3 * (size_t)t, p / 6, bound_N_m);
 }
 
 static double settled_s(const void *self)

@@ -6,10 +6,9 @@
  * period)) / 2. In each sub-step the nodes get the velocity that brings them to their position at its end
  * (PAL_PRESCRIBED), which depends on time only.
  *
- * Keys: those of rest_region.h, shift_m (0 0 0), turn_axis (0 0 1), turn_deg (0), rise_s (0), period_s (0: s stays
- * 1). */
+ * Keys: those of pal_support_read (definition.h), shift_m (0 0 0), turn_axis (0 0 1), turn_deg (0), rise_s (0),
+ * period_s (0: s stays 1). */
 #include "server/base/vec3.h"
-#include "server/sim/contact/rest_region.h"
 #include "server/sim/core/effect_list.h"
 
 typedef struct moving_support {
@@ -31,19 +30,21 @@ static pal_err read_keys(moving_support *m, pal_config_entry *entry, pal_diagnos
     PAL_TRY(pal_entry_read_number(entry, "period_s", 0, 1e6, &m->period_s, diag));
     PAL_TRY(pal_entry_check_unused(entry, diag));
     m->angle = degrees * M_PI / 180;
-    if (!pal_unit3(m->axis, m->axis, 0))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: turn_axis has no direction", entry->path);
+    if (!pal_unit3(m->axis, m->axis, 0)) return PAL_REFUSE(diag, "%s: turn_axis has no direction", entry->path);
     return PAL_ERR_OK;
 }
 
 static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
 {
     pal_body *body = build->body;
+    pal_support_def support;
     uint8_t *held;
     moving_support *m = PAL_NEW(build->arena, moving_support, 1);
     if (!m) return PAL_ERR_MEMORY;
     m->axis[2] = 1;
-    PAL_TRY(pal_rest_region_find(entry, body->x_rest, body->n_dof, build, &held));
+    PAL_TRY(pal_support_read(entry, &support, build->diag));
+    if (!(held = PAL_NEW(build->arena, uint8_t, body->n_dof))) return PAL_ERR_MEMORY;
+    pal_support_mark_fixed(&support, build->scene->up, body->x_rest, body->n_dof, held);
     PAL_TRY(read_keys(m, entry, build->diag));
     m->rise_s = fmax(m->rise_s, build->scene->step_s);
     m->node = PAL_NEW(build->arena, int32_t, body->n_dof);
@@ -56,8 +57,8 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
         m->node[m->n_node++] = i;
     }
     if (m->n_node == 0)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: moving_support holds none of the body's %d nodes",
-                                  entry->path, body->n_dof);
+        return PAL_REFUSE(build->diag, "%s: moving_support holds none of the body's %d nodes", entry->path,
+                          body->n_dof);
     pal_scale3(m->centre, 1.0 / m->n_node, m->centre);
     *self = m;
     return PAL_ERR_OK;

@@ -6,10 +6,9 @@
  * k is the stiffness against a translation of all nodes: under a force f they move by f / k. Explicit solvers derive
  * their step from it: a stiffer component needs more sub-steps.
  *
- * Keys: those of rest_region.h, k_N_m (100 E S, S the box diagonal: a body's weight moves it by less than 0.1 % of its
- * size). A k that is not given follows a live material edit. */
+ * Keys: those of pal_support_read (definition.h), k_N_m (100 E S, S the box diagonal: a body's weight moves it by less
+ * than 0.1 % of its size). A k that is not given follows a live material edit. */
 #include "server/base/vec3.h"
-#include "server/sim/contact/rest_region.h"
 #include "server/sim/core/effect_list.h"
 
 typedef struct penalty {
@@ -23,17 +22,19 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
 {
     const pal_body *body = build->body;
     double mass = 0;
+    pal_support_def support;
     uint8_t *held;
     penalty *p = PAL_NEW(build->arena, penalty, 1);
     if (!p) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_rest_region_find(entry, body->node_rest, body->n_node, build, &held));
+    PAL_TRY(pal_support_read(entry, &support, build->diag));
+    if (!(held = PAL_NEW(build->arena, uint8_t, body->n_node))) return PAL_ERR_MEMORY;
+    pal_support_mark_fixed(&support, build->scene->up, body->node_rest, body->n_node, held);
     p->per_young = pal_entry_has(entry, "k_N_m") ? 0 : 100 * body->length_scale_m;
     p->k_N_m = p->per_young * build->def->material.young_Pa;
     PAL_TRY(pal_entry_read_number(entry, "k_N_m", 1e-12, 1e60, &p->k_N_m, build->diag));
     PAL_TRY(pal_entry_check_unused(entry, build->diag));
     if (body->active)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
-                                  "%s: penalty holds no body that adapts: give it supports", entry->path);
+        return PAL_REFUSE(build->diag, "%s: penalty holds no body that adapts: give it supports", entry->path);
     p->node = PAL_NEW(build->arena, int32_t, body->n_node);
     p->share = PAL_NEW(build->arena, double, body->n_node);
     if (!p->node || !p->share) return PAL_ERR_MEMORY;
@@ -45,8 +46,7 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
         mass += body->node_mass_kg[i];
     }
     if (p->n_node == 0)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: penalty holds none of the body's %d nodes",
-                                  entry->path, body->n_node);
+        return PAL_REFUSE(build->diag, "%s: penalty holds none of the body's %d nodes", entry->path, body->n_node);
     for (int n = 0; n < p->n_node; n++) p->share[n] /= mass;
     *self = p;
     return PAL_ERR_OK;
@@ -93,19 +93,14 @@ static pal_err material(void *self, const pal_body *body, const pal_material *to
     return PAL_ERR_OK;
 }
 
-static void linearise(void *self, const pal_body *body)
-{
-    (void)self, (void)body;
-}
-
-static void multiply(void *self, const pal_body *body, double k, double c, const double *u, double *out)
+static void multiply(void *self, const pal_body *body, double k, const double *u, double *out)
 {
     const penalty *p = self;
-    (void)body, (void)c;
+    (void)body;
     add(p, k * p->k_N_m, u, NULL, out);
 }
 
-static const pal_tangent tangent = {.linearise = linearise, .multiply = multiply};
+static const pal_tangent tangent = {.multiply = multiply};
 
 const pal_effect pal_effect_penalty = {.name = "penalty",
                                        .stage = PAL_STAGE_FORCE,

@@ -6,13 +6,16 @@
 
 #include <stdint.h>
 
-/* bound_N_m of the ends of the edge opposite corner node[0] += its part for p / 6, Pa, positions x */
+/* bound_N_m of the nodes of a triangle += its part for p / 6, Pa, positions x */
 static inline void pal_pressure_bound(const double *x, const int32_t node[3], double sixth_Pa, double *bound_N_m)
 {
-    double middle[3];
-    pal_add3(middle, x + 3 * node[1], x + 3 * node[2]);
-    pal_scale3(middle, 0.5, middle);
-    const double bound = sixth_Pa * pal_dist3(x + 3 * node[0], middle);
-    bound_N_m[node[1]] += bound, bound_N_m[node[2]] += bound;
+    for (int c = 0; c < 3; c++) {
+        const int32_t a = node[(c + 1) % 3], b = node[(c + 2) % 3];
+        double middle[3];
+        pal_add3(middle, x + 3 * a, x + 3 * b);
+        pal_scale3(middle, 0.5, middle);
+        const double bound = sixth_Pa * pal_dist3(x + 3 * node[c], middle);
+        bound_N_m[a] += bound, bound_N_m[b] += bound;
+    }
 }
 #endif

@@ -65,9 +65,6 @@ typedef struct refine {
     pal_refine_history report;
 } refine;
 
-/* of a sum; masses and inertias are sums over triangles and nodes */
-static const double ROUNDING = 1e-9;
-
 enum { MAX_BACKOFF = 3, MAX_RELAX = 8 };
 
 /* ---- load ---- */
@@ -116,29 +113,18 @@ static pal_err read_keys(refine *row, pal_config_entry *item, const pal_build *b
     return pal_entry_check_unused(item, diag);
 }
 
-static double mean_edge(const pal_levels *levels)
-{
-    double sum = 0;
-    for (int32_t e = 0; e < levels->first_edge[1]; e++) {
-        const int32_t *end = levels->edge[e].vertex;
-        sum += pal_dist3(levels->x + 3 * (size_t)end[0], levels->x + 3 * (size_t)end[1]);
-    }
-    return sum / levels->first_edge[1];
-}
-
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     pal_adaptive_surface *adaptive = build->body->model.adaptive;
     if (!adaptive)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
-                                  "%s: refine needs a surface of levels, model adaptive_springs", item->path);
+        return PAL_REFUSE(build->diag, "%s: refine needs a surface of levels, model adaptive_springs", item->path);
     const pal_levels *levels = &adaptive->levels;
     size_t n_vertex = (size_t)levels->n_vertex[levels->n_level - 1];
     refine *row = PAL_NEW(build->arena, refine, 1);
     if (!row) return PAL_ERR_MEMORY;
     row->adaptive = adaptive;
     row->body = build->body;
-    row->edge_m = mean_edge(levels);
+    row->edge_m = pal_adaptive_mean_edge_m(levels, 0);
     row->kg_per_density = adaptive->level_mass_kg[0] / build->def->material.density_kg_m3;
     PAL_TRY(read_keys(row, item, build));
     PAL_TRY(pal_refine_measure_make(&row->measure, adaptive, build->arena));
@@ -332,7 +318,7 @@ static bool in_region(const refine *row, const pal_body *body, bool whole, int i
 {
     if (body->support[i]) return false;
     if (whole || row->seen[i] != row->report.n_switch) return true;
-    return fabs(body->mass_kg[i] - row->mass_was[i]) > ROUNDING * row->mass_was[i];
+    return fabs(body->mass_kg[i] - row->mass_was[i]) > PAL_ROUNDING * row->mass_was[i];
 }
 
 /* restores the energy of springs or anchors by their ramp; returns it, J */
@@ -343,7 +329,7 @@ static double keep_elastic(const refine *row, double was_J, double now_J, double
     if (row->ramp_s > 0 && fabs(now_J - was_J) > min) {
         /* negligible beside the other's energy: as it is */
         if (was_J > 1e-9 * other_J && now_J > 1e-9 * other_J)
-            *ramp = fmin(fmax(was * was_J / now_J, 1 / (MAX_FACTOR * MAX_FACTOR)), MAX_FACTOR);
+            *ramp = fmin(fmax(was * was_J / now_J, 1 / (PAL_CHANGE_MAX * PAL_CHANGE_MAX)), PAL_CHANGE_MAX);
         *left_s = row->ramp_s;
     }
     return now_J * *ramp / was;
@@ -359,7 +345,7 @@ static void spin_of(const region *r, const double angular[3], double Omega[3])
 {
     pal_set3(Omega, 0, 0, 0);
     for (int k = 0; k < 3; k++)
-        if (r->inertia[k] > ROUNDING * r->inertia[2])
+        if (r->inertia[k] > PAL_ROUNDING * r->inertia[2])
             pal_axpy3(Omega, pal_dot3(r->inertia_axis + 3 * k, angular) / r->inertia[k], r->inertia_axis + 3 * k);
 }
 
@@ -430,9 +416,9 @@ static bool keep_motion(const refine *row, pal_body *body, double gained_J, bool
                       0.5 * (r.mass * pal_dot3(V, V) + pal_dot3(spin, angular));
     /* nothing to scale where the region moves rigidly */
     double scale = r.inner_J > 1e-12 * raw->kinetic_J ? sqrt(fmax(wanted_J, 0) / r.inner_J) : 1;
-    bool enough = scale >= 1 / MAX_FACTOR && scale <= MAX_FACTOR && r.inertia[0] > ROUNDING * r.inertia[2];
+    bool enough = scale >= 1 / PAL_CHANGE_MAX && scale <= PAL_CHANGE_MAX && r.inertia[0] > PAL_ROUNDING * r.inertia[2];
     if (!enough && !whole) return false;
-    scale = fmin(fmax(scale, 1 / MAX_FACTOR), MAX_FACTOR);
+    scale = fmin(fmax(scale, 1 / PAL_CHANGE_MAX), PAL_CHANGE_MAX);
     for (int k = 0; k < body->n_active; k++) {
         const int i = pal_body_point(body, k);
         if (!in_region(row, body, whole, i)) continue;

@@ -50,8 +50,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     int world = 0;
     for (int i = 0; i < build->body->n_dof; i++) world |= build->body->support[i] != PAL_FREE;
     if (!build->body->model.adaptive)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model adaptive_springs",
-                                  item->path, item->name);
+        return PAL_REFUSE(build->diag, "%s: \"%s\" needs a body of model adaptive_springs", item->path, item->name);
     shape_spring *row = PAL_NEW(build->arena, shape_spring, 1);
     if (!row) return PAL_ERR_MEMORY;
     row->c_Ns_m = -1;

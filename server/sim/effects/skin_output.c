@@ -22,8 +22,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     pal_body *body = build->body;
     if (!body->display.skin || !body->display.surface ||
         body->display.skin->n_vertex != body->display.surface->n_vertex || body->display.skin->n_node > body->n_node)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: the body has no skin that fits its mesh",
-                                  item->path);
+        return PAL_REFUSE(build->diag, "%s: the body has no skin that fits its mesh", item->path);
     double *axes = PAL_NEW(build->arena, double, axes_count(body->display.skin));
     float *shown = PAL_NEW(build->arena, float, 3 * (size_t)body->display.skin->n_vertex);
     if (!axes || !shown) return PAL_ERR_MEMORY;

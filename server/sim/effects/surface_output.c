@@ -98,8 +98,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     const pal_tets *tets = body->tets;
     const bool boundary = !body->active && !body->interpolation;
     if (boundary && (!tets || tets->n_face == 0 || tets->n_node > body->n_node))
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: the body has no boundary faces to show",
-                                  item->path);
+        return PAL_REFUSE(build->diag, "%s: the body has no boundary faces to show", item->path);
     surface_output *out = PAL_NEW(build->arena, surface_output, 1);
     if (!out) return PAL_ERR_MEMORY;
     out->body = body;

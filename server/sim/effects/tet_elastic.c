@@ -98,8 +98,8 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     bool own = body->element && body->n_corner == options.n_corner;
     if (!own && (options.n_corner == 10 || !body->tets))
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: body \"%s\" has no elements of %d nodes",
-                                  item->path, body->name, options.n_corner);
+        return PAL_REFUSE(build->diag, "%s: body \"%s\" has no elements of %d nodes", item->path, body->name,
+                          options.n_corner);
     options.tet = own ? body->element : body->tets->tet;
     options.n_tet = own ? body->n_element : body->tets->n_tet;
     options.fill = own && fill ? body->fill : NULL;
@@ -199,21 +199,19 @@ static void linearise(void *self, const pal_body *body)
     if (row->has_inversion) pal_elastic_tets_linearise(row->split, body->d);
 }
 
-static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
-{
-    (void)body, (void)c;
-    if (k != 0) pal_elastic_tets_multiply(acting(self), k, p, out);
-}
-
-static void assemble(void *self, const pal_body *body, double k, double c, pal_block_matrix *to)
-{
-    (void)body, (void)c;
-    if (k != 0) pal_elastic_tets_assemble(acting(self), k, to);
-}
-
-static void rotate(void *self, const pal_body *body, double *rotation)
+static void multiply(void *self, const pal_body *body, double k, const double *p, double *out)
 {
     (void)body;
+    pal_elastic_tets_multiply(acting(self), k, p, out);
+}
+
+static void assemble(void *self, double k, pal_block_matrix *to)
+{
+    pal_elastic_tets_assemble(acting(self), k, to);
+}
+
+static void rotate(void *self, double *rotation)
+{
     pal_elastic_tets_rotate(acting(self), rotation);
 }
 

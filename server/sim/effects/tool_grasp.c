@@ -72,8 +72,7 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
     PAL_TRY(pal_entry_read_number(entry, "reach_m", 0, 10, &grasps->asked_reach_m, build->diag));
     PAL_TRY(pal_entry_check_unused(entry, build->diag));
     if (build->body->display.n_shown == 0)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: tool_grasp needs a body with a shown surface",
-                                  entry->path);
+        return PAL_REFUSE(build->diag, "%s: tool_grasp needs a body with a shown surface", entry->path);
     size_t n_node = (size_t)build->body->n_node, scratch = 6 * sizeof(double) * n_node + 256;
     if (build->body->implicit) {
         build->body->wants_compliance = true;
@@ -166,7 +165,7 @@ static void close_grasp(pal_grasps *grasps, pal_grasp *g, const pal_tool *tool, 
     g->closed = true;
     double k = pal_grasp_stiffness_N_m(grasps, reach),
            tissue = 2 * grasps->young_Pa * reach / (1 - grasps->poisson * grasps->poisson);
-    pal_stiffness_fit_start(&g->fit, fmax(MIN_STIFFNESS_N_M, k * tissue / (k + tissue)));
+    pal_stiffness_fit_start(&g->fit, fmax(STIFFNESS_N_M.low, k * tissue / (k + tissue)));
     pal_stiffness_fit_add(&g->fit, tool->last.position_m, (double[3]){0}, tool->radius_m);
     if (g->implicit) *g->implicit = (pal_grasp_implicit){.pulls = false};
 }

@@ -2,8 +2,8 @@
  *
  * A proxy of the tool stays on the side it came from (proxy.h). A contact point at depth d within the proxy's sphere is
  * pushed away from the proxy's centre with f = k d, k = stiffness_Pa_m * area, and the opposite force acts on the tool.
- * The contact regime sets k and how a solver treats it (push.h). The sum is limited to the caps (tool_force.h) and
- * scaled by the tool's ramp.
+ * The contact regime sets k and how a solver treats it (push.h). The sum is limited to the caps (pal_tool_force_share)
+ * and scaled by the tool's ramp.
  *
  * A tool that grasps tissue (tool_grasp) does not push it, because its sphere would act against its own grasp. A
  * tool that appears inside tissue starts at the nearest position outside. A proxy that stays farther than slip_S box
@@ -62,8 +62,7 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
     if (!push) return PAL_ERR_MEMORY;
     PAL_TRY(read_keys(push, entry, build->diag));
     if (build->body->display.n_shown == 0)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: tool_push needs a body with a shown surface",
-                                  entry->path);
+        return PAL_REFUSE(build->diag, "%s: tool_push needs a body with a shown surface", entry->path);
     PAL_TRY(material(push, build->body, &build->def->material, NULL));
     push->n_tool = scene->n_tool;
     push->body_index = (int)(build->def - scene->body);
@@ -188,7 +187,7 @@ static void approach(pal_push *push, pal_tool_contact *h, pal_tool *tool, pal_st
     double *x = PAL_NEW(step->scratch, double, 3 * (size_t)h->n_list),
            *core = PAL_NEW(step->scratch, double, h->n_list);
     if (x && core) {
-        for (int i = 0; i < h->n_list; i++) pal_contact_points_position(&push->points, h->list[i], x + 3 * i);
+        for (int i = 0; i < h->n_list; i++) pal_contact_points_at(&push->points, h->list[i], push->points.x, x + 3 * i);
         pal_proxy_move(&h->proxy, here, x, h->n_list, &h->limits, step->dt_s, core);
         find_contacts(push, h, step->body, x);
     }
@@ -219,9 +218,9 @@ static void wanted(void *self, const pal_body *body, double *bound_N_m)
     if (push->regime == &pal_push_interpolated) pal_push_want(push, body, bound_N_m);
 }
 
-static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
+static void multiply(void *self, const pal_body *body, double k, const double *p, double *out)
 {
-    (void)body, (void)c;
+    (void)body;
     pal_contact_springs_multiply(((pal_push *)self)->springs, k, p, out);
 }
 

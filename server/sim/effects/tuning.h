@@ -3,9 +3,6 @@
 #ifndef PAL_SIM_EFFECTS_TUNING_H
 #define PAL_SIM_EFFECTS_TUNING_H
 
-/* square of a length, or of an area, over that at rest, below which a spring has no direction: 1e-9 is far below any
- * strain and far above rounding (test_springs, test_edge_spring: collapsed bodies open again) */
-#define MIN_Q 1e-18
 /* loaded area over a triangle's area at rest at most: a load that grows with the area it inflates has no equilibrium
  * from about E/3 on (test_brush) */
 #define MAX_AREA 2
@@ -16,7 +13,4 @@
 #define STILL_EDGES 1e-4
 /* of the energy without rigid motion. A smaller change at a switch is not worth a factor on the stiffness */
 #define RAMP_FROM 2.5e-3
-/* velocities are scaled by at most this, and at least by its inverse; stiffness, which goes with its square, by at
- * least the inverse of that */
-#define MAX_FACTOR 2.0
 #endif

@@ -24,7 +24,7 @@ static void precondition(void *user, const double *r, double *z)
 static pal_compliance_entry *find_known(pal_compliance_solver *solver, double size2, double *share)
 {
     pal_compliance_entry *best = NULL, *oldest = &solver->known[0];
-    double nearest = PAL_COMPLIANCE_COSINE * PAL_COMPLIANCE_COSINE;
+    double nearest = PAL_SAME_COSINE * PAL_SAME_COSINE;
     for (int k = 0; k < PAL_COMPLIANCE_CACHE; k++) {
         pal_compliance_entry *known = &solver->known[k];
         if (known->used < oldest->used) oldest = known;

@@ -60,10 +60,10 @@ static pal_err make_arrays(pal_implicit *core, pal_arena *arena)
     return made ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-/* factors of A = (1 + tau c) M + tau^2 K + tau C */
+/* factors of A = (1 + tau c) M + tau^2 K + tau D */
 static void set_factors(pal_implicit *core, double tau)
 {
-    core->system.mass = 1 + tau * pal_system_drag(&core->system);
+    core->system.mass = 1 + tau * pal_guard_drag_1_s(core->system.force, core->system.n_force);
     core->system.stiff = tau * tau;
     core->system.damp = tau;
 }
@@ -106,10 +106,9 @@ pal_err pal_implicit_make(pal_config_entry *item, pal_build *build, double share
         err =
             pal_compliance_solver_make(&core->system, &core->rotations, &core->blocks, build->arena, &core->compliance);
     if (err == PAL_ERR_NUMERIC)
-        return pal_diagnostic_set(
-            build->diag, PAL_ERR_REFUSED,
-            "body \"%s\": mass and stiffness at rest for steps of %g s make no positive definite matrix", body->name,
-            core->tau_rest_s);
+        return PAL_REFUSE(build->diag,
+                          "body \"%s\": mass and stiffness at rest for steps of %g s make no positive definite matrix",
+                          body->name, core->tau_rest_s);
     return err;
 }
 
@@ -127,19 +126,19 @@ static double norm(const pal_implicit *core, const double *r)
     return sqrt(pal_dot_product(core->cg.n, r, r));
 }
 
-/* q += (k K + c C) (a - b) of contact; cg.z is the difference */
-static void add_contact(pal_implicit *core, double k, double c, const double *a, const double *b, double *q)
+/* q += k K (a - b) of contact; cg.z is the difference */
+static void add_contact(pal_implicit *core, double k, const double *a, const double *b, double *q)
 {
     for (int i = 0; i < core->cg.n; i++) core->cg.z[i] = a[i] - b[i];
-    pal_system_multiply_contact(&core->system, k, c, core->cg.z, q);
+    pal_system_multiply_contact(&core->system, k, core->cg.z, q);
 }
 
-/* half the work of the stiffness or damping of contact over a - b */
-static double contact_energy(pal_implicit *core, double k, double c, const double *a, const double *b)
+/* half the work of the stiffness of contact since the sub-step's begin */
+static double contact_energy(pal_implicit *core)
 {
     double *q = core->cg.q;
     memset(q, 0, pal_body_bytes3(core->system.body));
-    add_contact(core, k, c, a, b, q);
+    add_contact(core, 1, core->system.body->x, core->x0, q);
     return 0.5 * pal_dot_product(core->cg.n, core->cg.z, q);
 }
 
@@ -162,8 +161,7 @@ static double residual(pal_implicit *core, double tau, const double *velocity, d
     if (core->system.has_contact) {
         double *q = core->cg.q;
         memset(q, 0, pal_body_bytes3(core->system.body));
-        add_contact(core, tau, 0, body->x, core->x0, q);
-        add_contact(core, 0, tau, velocity, core->v0, q);
+        add_contact(core, tau, body->x, core->x0, q);
         for (int i = 0; i < core->cg.n; i++) r[i] -= q[i];
     }
     pal_system_clear_supported(body, b);
@@ -185,7 +183,7 @@ static double interpolated_potential(pal_implicit *core, const double *velocity)
 }
 
 /* the incremental potential at V where the body is now: kinetic + drag + rows - loads + contact, J */
-static double potential(pal_implicit *core, double tau, const double *velocity)
+static double potential(pal_implicit *core, const double *velocity)
 {
     const pal_body *body = core->system.body;
     double sum = pal_system_energy(&core->system), keep = core->system.mass - 1;
@@ -198,8 +196,7 @@ static double potential(pal_implicit *core, double tau, const double *velocity)
             sum += m * (slip * slip + keep * velocity[c] * velocity[c]) - body->load[c] * (body->x[c] - core->x0[c]);
         }
     }
-    if (!core->system.has_contact) return sum;
-    return sum + contact_energy(core, 1, 0, body->x, core->x0) + contact_energy(core, 0, tau, velocity, core->v0);
+    return core->system.has_contact ? sum + contact_energy(core) : sum;
 }
 
 /* conjugate gradients from the guess body->v; core->cg.r is the residual at `start`. The velocities it ends with */
@@ -323,11 +320,11 @@ static void line_search(pal_implicit *core, double tau)
     }
     if (!(slope < 0)) return;
     set_positions(core, tau, core->start);
-    double at_start = potential(core, tau, core->start), noise = 1e-13 * fabs(at_start);
+    double at_start = potential(core, core->start), noise = 1e-13 * fabs(at_start);
     for (;; step *= 0.5) {
         for (int i = 0; i < core->cg.n; i++) v[i] = core->start[i] + step * move[i];
         set_positions(core, tau, v);
-        if (step < 1e-3 || potential(core, tau, v) <= at_start + 1e-4 * step * slope + noise) break;
+        if (step < 1e-3 || potential(core, v) <= at_start + 1e-4 * step * slope + noise) break;
     }
     core->report.step_size = step;
 }
@@ -362,7 +359,7 @@ static double work_done(pal_implicit *core)
         return pal_sum_work(core->cg.n, body->load, body->x, core->x0);
     for (int i = 0; i < core->cg.n; i++) p[i] = body->x[i] - core->x0[i];
     double work = pal_system_work(&core->system, p);
-    return core->system.has_contact ? work - contact_energy(core, 1, 0, body->x, core->x0) : work;
+    return core->system.has_contact ? work - contact_energy(core) : work;
 }
 
 /* energy of the body as it is: kinetic, of the rows, less the work of loads and contact since the sub-step's begin,
@@ -453,7 +450,7 @@ static bool contact_acts(pal_implicit *core)
     if (core->system.n_free < core->system.body->n_dof) return true;
     for (int i = 0; i < core->cg.n; i++) p[i] = (const double[]){1, M_SQRT2, M_PI}[i % 3];
     memset(q, 0, pal_body_bytes3(core->system.body));
-    pal_system_multiply_contact(&core->system, 1, 1, p, q);
+    pal_system_multiply_contact(&core->system, 1, p, q);
     for (int i = 0; i < core->cg.n; i++)
         if (q[i] != 0) return true;
     return false;
@@ -528,7 +525,7 @@ static void update_probed(pal_implicit *core, pal_step *step)
  * for ever; an inverted body needs a few such sub-steps to recover */
 static bool is_cycling(pal_implicit *core, double dt_s)
 {
-    const double limit_s = PAL_ENERGY_RISE_S * (1 + 1e-9);
+    const double limit_s = PAL_PAUSE_S * (1 + 1e-9);
     core->steady_s = core->energy_rose ? 0 : core->steady_s + dt_s;
     if (core->energy_rose) core->energy_rise_s += dt_s;
     if (core->steady_s > limit_s) core->energy_rise_s = 0;
@@ -597,10 +594,10 @@ pal_err pal_implicit_material(void *self, const pal_body *body, const pal_materi
     for (int i = 0; i < body->n_node; i++) body->mass_kg[i] /= ratio;
     if (!err) core->density = material->density_kg_m3;
     if (err == PAL_ERR_NUMERIC)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "body \"%s\": with E %g Pa, nu %g and %g kg/m^3 its matrix at rest is "
-                                  "not positive definite",
-                                  body->name, material->young_Pa, material->poisson, material->density_kg_m3);
+        return PAL_REFUSE(diag,
+                          "body \"%s\": with E %g Pa, nu %g and %g kg/m^3 its matrix at rest is "
+                          "not positive definite",
+                          body->name, material->young_Pa, material->poisson, material->density_kg_m3);
     return err;
 }
 

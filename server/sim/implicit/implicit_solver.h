@@ -1,7 +1,7 @@
 /* Core shared by implicit_euler and sdirk2. A stage finds velocities V with
  *     M (V - v*) = tau (f(x* + tau V) - c M V),
  * where f is the force of all components and contact, and c the drag rate. Newton's method linearises the forces
- * about a state, so that V solves A V = b, A = (1 + tau c) M + tau^2 K + tau C, by conjugate gradients with the
+ * about a state, so that V solves A V = b, A = (1 + tau c) M + tau^2 K + tau D, by conjugate gradients with the
  * warped factor of A at rest.
  *
  * The first iteration starts from the state at the beginning of the stage, not from an extrapolated one. With the
@@ -12,7 +12,7 @@
  * a second free of gains, is in a cycle, as crushed elements with averaged rotations are. From then on each such
  * sub-step is undone and the velocity set to zero, so that the energy cannot rise.
  *
- * Contact gives its loads at the beginning of the sub-step; its stiffness and damping act on the motion since then,
+ * Contact gives its loads at the beginning of the sub-step; its stiffness acts on the motion since then,
  * and `settle` brings the forces on tools to the end of the sub-step. Fixed nodes move with body->v (0 unless
  * prescribed). The momentum of a free body is conserved to rounding whatever the tolerance, because the mean of the
  * residual is removed. step_guard.h limits displacements.

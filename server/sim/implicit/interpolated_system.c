@@ -156,20 +156,18 @@ static pal_err make_groups(pal_interpolated_system *e, const pal_body *body, pal
 
 /* ---- making ---- */
 
-static pal_err make_arrays(pal_interpolated_system *e, const pal_body *body, bool with_damping, pal_arena *arena)
+static pal_err make_arrays(pal_interpolated_system *e, const pal_body *body, pal_arena *arena)
 {
     size_t node3 = 3 * (size_t)body->n_node, dof3 = 3 * (size_t)body->n_dof;
-    size_t entry9 = with_damping ? 9 * (size_t)e->rest.start[e->rest.n] : 0;
     bool made = PAL_NEW_DOUBLES(arena, node3, &e->p, &e->q) && PAL_NEW_DOUBLES(arena, 3 * node3, &e->rotation) &&
-                PAL_NEW_DOUBLES(arena, dof3, &e->unit, &e->product) &&
-                (!with_damping || PAL_NEW_DOUBLES(arena, entry9, &e->damping));
+                PAL_NEW_DOUBLES(arena, dof3, &e->unit, &e->product);
     return made ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 /* at least `n_group` groups are needed: points with a common neighbour, which those of a clique are, go alone */
-static pal_err check_work(const pal_body *body, int n_group, bool damped, pal_diagnostic *diag)
+static pal_err check_work(const pal_body *body, int n_group, pal_diagnostic *diag)
 {
-    double moves = 3.0 * n_group * (damped ? 2 : 1);
+    double moves = 3.0 * n_group;
     if (moves * body->n_node <= PAL_PROBE_WORK_MAX) return PAL_ERR_OK;
     return pal_diagnostic_set(
         diag, PAL_ERR_BUDGET,
@@ -183,21 +181,18 @@ pal_err pal_interpolated_system_make(const pal_body *body, const pal_component *
 {
     pal_interpolated_system *e = PAL_NEW(arena, pal_interpolated_system, 1);
     if (!e) return PAL_ERR_MEMORY;
-    bool damped = false; /* by an internal component, not by drag */
     int clique = 0;
-    for (int i = 0; i < n_force; i++)
-        damped |= force[i].effect->tangent && force[i].effect->bounds.damping && !force[i].effect->drag;
     clique_list cliques = {0};
     pal_err err = list_cliques(body, force, n_force, &cliques);
     for (int i = 0; i < cliques.n; i++) clique = cliques.list[i].n_corner > clique ? cliques.list[i].n_corner : clique;
-    if (!err) err = check_work(body, clique, damped, diag);
+    if (!err) err = check_work(body, clique, diag);
     if (!err) err = pal_block_matrix_make(body->n_dof, cliques.list, cliques.n, arena, &e->rest);
     free_cliques(&cliques);
     PAL_TRY(err);
-    PAL_TRY(make_arrays(e, body, damped, arena));
+    PAL_TRY(make_arrays(e, body, arena));
     PAL_TRY(make_groups(e, body, arena));
-    PAL_TRY(check_work(body, e->n_group, damped, diag));
-    e->n_move = 3 * e->n_group * (e->damping ? 2 : 1);
+    PAL_TRY(check_work(body, e->n_group, diag));
+    e->n_move = 3 * e->n_group;
     *out = e;
     return PAL_ERR_OK;
 }

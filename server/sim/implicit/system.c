@@ -5,7 +5,6 @@
 #include "server/base/vec3.h"
 #include "server/num/conjugate_gradient.h"
 #include "server/num/union_find.h"
-#include "server/sim/core/step_guard.h"
 #include "server/sim/implicit/tuning.h"
 #include "server/sim/subdivision/subdivision_mass.h"
 
@@ -80,7 +79,8 @@ void pal_system_linearise(const pal_system *system)
 {
     for (int i = 0; i < system->n_force; i++) {
         const pal_component *component = &system->force[i];
-        if (component->effect->tangent) component->effect->tangent->linearise(component->self, system->body);
+        const pal_tangent *tangent = component->effect->tangent;
+        if (tangent && tangent->linearise) tangent->linearise(component->self, system->body);
     }
 }
 
@@ -106,19 +106,19 @@ void pal_system_linearise_rest(const pal_system *system)
     body->x = x, body->d = d;
 }
 
-/* one group along one axis; into `value` go the columns of its points, from the diagonal down */
-static void probe(pal_interpolated_system *e, const pal_system *system, int move, double *value)
+/* one group along one axis; into e->rest go the columns of its points, from the diagonal down */
+static void probe(pal_interpolated_system *e, const pal_system *system, int move)
 {
     const int axis = move % 3, group = move / 3;
     const int32_t *point = e->point + e->start[group], n = e->start[group + 1] - e->start[group];
     memset(e->unit, 0, 3 * sizeof(double) * (size_t)e->rest.n);
     memset(e->product, 0, 3 * sizeof(double) * (size_t)e->rest.n);
     for (int32_t i = 0; i < n; i++) e->unit[3 * point[i] + axis] = 1;
-    pal_system_multiply_stiffness(system, value != e->damping, value == e->damping, e->unit, e->product);
+    pal_system_multiply_stiffness(system, 1, e->unit, e->product);
     for (int32_t i = 0; i < n; i++)
         for (int32_t k = e->rest.start[point[i]]; k < e->rest.start[point[i] + 1]; k++)
             for (int c = 0; c < 3; c++)
-                value[9 * (size_t)k + (size_t)(3 * c + axis)] = e->product[3 * e->rest.row[k] + c];
+                e->rest.value[9 * (size_t)k + (size_t)(3 * c + axis)] = e->product[3 * e->rest.row[k] + c];
 }
 
 bool pal_system_probe(pal_system *system, int max)
@@ -127,10 +127,7 @@ bool pal_system_probe(pal_system *system, int max)
     if (!e || e->next == e->n_move) return true;
     double before = pal_clock_s();
     pal_system_linearise_rest(system);
-    for (; max > 0 && e->next < e->n_move; max--, e->next++) {
-        bool second = e->next >= 3 * e->n_group;
-        probe(e, system, second ? e->next - 3 * e->n_group : e->next, second ? e->damping : e->rest.value);
-    }
+    for (; max > 0 && e->next < e->n_move; max--) probe(e, system, e->next++);
     system->assemble_s += pal_clock_s() - before;
     return e->next == e->n_move;
 }
@@ -149,7 +146,7 @@ void pal_system_rotate(const pal_system *system, double *rotation)
     for (int i = 0; i < system->n_force; i++) {
         const pal_component *component = &system->force[i];
         if (component->effect->tangent && component->effect->tangent->rotate)
-            component->effect->tangent->rotate(component->self, body, to);
+            component->effect->tangent->rotate(component->self, to);
     }
     if (!system->interpolated_system) return;
     memset(rotation, 0, 9 * sizeof(double) * (size_t)body->n_dof);
@@ -158,7 +155,7 @@ void pal_system_rotate(const pal_system *system, double *rotation)
 
 /* ---- products ---- */
 
-static void multiply_rows(const pal_system *system, const pal_component *component, int n_row, double k, double c,
+static void multiply_rows(const pal_system *system, const pal_component *component, int n_row, double k,
                           const double *p, double *out)
 {
     const pal_body *body = system->body;
@@ -169,20 +166,19 @@ static void multiply_rows(const pal_system *system, const pal_component *compone
     }
     for (int i = 0; i < n_row; i++) {
         const pal_tangent *tangent = component[i].effect->tangent;
-        if (tangent && tangent->multiply)
-            tangent->multiply(component[i].self, body, k, c, e ? e->p : p, e ? e->q : out);
+        if (tangent && tangent->multiply) tangent->multiply(component[i].self, body, k, e ? e->p : p, e ? e->q : out);
     }
     if (e) pal_interpolation_apply_transpose(body->interpolation, e->q, out);
 }
 
-void pal_system_multiply_stiffness(const pal_system *system, double k, double c, const double *p, double *out)
+void pal_system_multiply_stiffness(const pal_system *system, double k, const double *p, double *out)
 {
-    multiply_rows(system, system->force, system->n_force, k, c, p, out);
+    multiply_rows(system, system->force, system->n_force, k, p, out);
 }
 
-void pal_system_multiply_contact(const pal_system *system, double k, double c, const double *p, double *out)
+void pal_system_multiply_contact(const pal_system *system, double k, const double *p, double *out)
 {
-    if (system->has_contact) multiply_rows(system, system->contact, system->n_contact, k, c, p, out);
+    if (system->has_contact) multiply_rows(system, system->contact, system->n_contact, k, p, out);
 }
 
 void pal_system_multiply_inertia(const pal_system *system, double mass, double damp, const double *p, double *out)
@@ -208,8 +204,8 @@ double pal_system_inertia_norm2(const pal_system *system, double mass, double da
 void pal_system_multiply(const pal_system *system, const double *p, double *out)
 {
     pal_system_multiply_inertia(system, system->mass, system->damp, p, out);
-    pal_system_multiply_stiffness(system, system->stiff, system->damp, p, out);
-    pal_system_multiply_contact(system, system->stiff, system->damp, p, out);
+    pal_system_multiply_stiffness(system, system->stiff, p, out);
+    pal_system_multiply_contact(system, system->stiff, p, out);
     pal_system_clear_supported(system->body, out);
 }
 
@@ -252,13 +248,12 @@ void pal_system_true_stiffness(const pal_system *system, const double *x, double
     pal_system_interpolate(system);
 }
 
-/* rest and damping of an interpolated body, and its masses */
+/* the matrix of an interpolated body at rest, and its masses */
 static void assemble_interpolated(const pal_system *system, pal_block_matrix *to)
 {
     const pal_body *body = system->body;
     const pal_interpolated_system *e = system->interpolated_system;
-    for (size_t i = 0; i < 9 * (size_t)to->start[to->n]; i++)
-        to->value[i] = system->stiff * e->rest.value[i] + (e->damping ? system->damp * e->damping[i] : 0);
+    for (size_t i = 0; i < 9 * (size_t)to->start[to->n]; i++) to->value[i] = system->stiff * e->rest.value[i];
     const pal_mass_operator *m = body->mass_operator;
     for (int i = 0; i < body->n_dof; i++) {
         for (int32_t k = m ? m->start[i] : 0; m && k < m->start[i + 1]; k++) {
@@ -283,7 +278,7 @@ static void assemble_nodes(const pal_system *system, pal_block_matrix *to)
     for (int i = 0; i < system->n_force; i++) {
         const pal_component *component = &system->force[i];
         if (component->effect->tangent && component->effect->tangent->assemble)
-            component->effect->tangent->assemble(component->self, body, system->stiff, system->damp, to);
+            component->effect->tangent->assemble(component->self, system->stiff, to);
     }
 }
 
@@ -320,11 +315,6 @@ double pal_system_energy(const pal_system *system)
         if (component->effect->energy) sum += component->effect->energy(component->self, system->body);
     }
     return sum;
-}
-
-double pal_system_drag(const pal_system *system)
-{
-    return pal_guard_drag_1_s(system->force, system->n_force);
 }
 
 /* ---- supports ---- */

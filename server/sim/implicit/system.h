@@ -1,9 +1,8 @@
 /* The FORCE and CONTACT components of one body as one system of equations, which implicit solvers multiply, assemble
- * and search along. The operator is mass M + stiff K + damp C. K and C are those of the components' last
- * linearise. M is the mass matrix, lumped or between control points (num/mass_operator.h, whose damping between
- * control points is part of C). Rows and columns of fixed dofs are omitted. Vectors are over dofs, [n_dof][3]. Where
- * nodes are interpolated from control points, a displacement is interpolated to the nodes and the result restricted.
- * Thread: [load] to make, then [sim]. */
+ * and search along. The operator is mass M + stiff K + damp D. K is that of the components' last linearise, M
+ * the mass matrix, lumped or between control points (num/mass_operator.h, which has D, the damping between them). Rows
+ * and columns of fixed dofs are omitted. Vectors are over dofs, [n_dof][3]. Where nodes are interpolated from control
+ * points, a displacement is interpolated to the nodes and the result restricted. Thread: [load] to make, then [sim]. */
 #ifndef PAL_SIM_IMPLICIT_SYSTEM_H
 #define PAL_SIM_IMPLICIT_SYSTEM_H
 #include "server/sim/implicit/interpolated_system.h"
@@ -18,7 +17,7 @@ typedef struct pal_system {
     bool has_energy;          /* every FORCE component except drag reports its energy */
     bool has_rotation;        /* some component reports rotations */
     bool has_contact;         /* some CONTACT component has a tangent */
-    double mass, stiff, damp; /* coefficients of M, K, C */
+    double mass, stiff, damp; /* coefficients of M, K, D */
     double assemble_s;        /* time in pal_system_assemble and pal_system_probe */
 } pal_system;
 
@@ -42,23 +41,23 @@ void pal_system_linearise(const pal_system *system); /* linearises the FORCE com
 void pal_system_linearise_contact(pal_system *system, const pal_step *step);
 /* rotation [n_dof][9] = sum of the components' rotations */
 void pal_system_rotate(const pal_system *system, double *rotation);
-/* out = (mass M + stiff K + damp C) p; p may be nonzero at fixed dofs, where out is 0 */
+/* out = (mass M + stiff K + damp D) p; p may be nonzero at fixed dofs, where out is 0 */
 void pal_system_multiply(const pal_system *system, const double *p, double *out);
-/* out = (mass M + damp D) p, with D the damping between control points */
+/* out = (mass M + damp D) p */
 void pal_system_multiply_inertia(const pal_system *system, double mass, double damp, const double *p, double *out);
 /* p' (mass M + damp D) p of an interpolated body */
 double pal_system_inertia_norm2(const pal_system *system, double mass, double damp, const double *p);
-/* out += (k K + c C) p of the FORCE components alone */
-void pal_system_multiply_stiffness(const pal_system *system, double k, double c, const double *p, double *out);
-/* out += (k K + c C) p of contact alone */
-void pal_system_multiply_contact(const pal_system *system, double k, double c, const double *p, double *out);
+/* out += k K p of the FORCE components alone */
+void pal_system_multiply_stiffness(const pal_system *system, double k, const double *p, double *out);
+/* out += k K p of contact alone */
+void pal_system_multiply_contact(const pal_system *system, double k, const double *p, double *out);
 /* out = -df/dx p of the internal forces at x by central difference: the true stiffness, which may be indefinite.
  * Sets body->x to x, overwrites body->f and g; low is work space; out is 0 at fixed dofs */
 void pal_system_true_stiffness(const pal_system *system, const double *x, double *low, const double *p, double *out);
-/* the operator without contact, fixed dofs included; for an interpolated body with K and C at rest (pal_system_probe)
+/* the operator without contact, fixed dofs included; for an interpolated body with K at rest (pal_system_probe)
  * and fixed dofs omitted */
 void pal_system_assemble(pal_system *system, pal_block_matrix *to);
-/* finds K and C of an interpolated body at rest, whatever its present state, by at most `max` products; true:
+/* finds K of an interpolated body at rest, whatever its present state, by at most `max` products; true:
  * complete. Leaves the components linearised at rest unless there was nothing to do. Without interpolation: does
  * nothing, returns true. No heap */
 bool pal_system_probe(pal_system *system, int max);
@@ -73,7 +72,6 @@ bool pal_system_settle_contact(const pal_system *system, pal_step *step, const d
 /* work of the nodal loads along a displacement p, J */
 double pal_system_work(const pal_system *system, const double *p);
 double pal_system_energy(const pal_system *system); /* J, of the FORCE components at body->d   */
-double pal_system_drag(const pal_system *system);   /* sum of the components' drag rates, 1/s */
 
 /* parts of the body that the tangents do not couple, and their supports */
 typedef struct pal_support_report {

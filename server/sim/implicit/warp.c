@@ -94,7 +94,7 @@ void pal_warp_step(pal_warp *warp, double dt_s)
 {
     warp->left_s -= dt_s;
     if (!warp->pending || warp->left_s > 0) return;
-    warp->pending = false, warp->left_s = PAL_REFRESH_PAUSE_S;
+    warp->pending = false, warp->left_s = PAL_PAUSE_S;
     if (pal_cholesky_adopt(warp->factor)) return;
     memcpy(warp->base, warp->next, 4 * sizeof(double) * (size_t)warp->n_dof);
     warp->n_factor++;

@@ -42,8 +42,8 @@ static pal_err read_keys(pal_config_entry *item, keys *out, pal_diagnostic *diag
     PAL_TRY(pal_entry_read_count(item, "levels", 1, PAL_LEVELS_MAX, &adaptive->n_level, diag));
     PAL_TRY(pal_entry_read_count(item, "start_level", 0, PAL_LEVELS_MAX, &adaptive->start_level, diag));
     if (adaptive->start_level >= adaptive->n_level)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.start_level: %d, wanted 0 to %d as levels is %d",
-                                  item->path, adaptive->start_level, adaptive->n_level - 1, adaptive->n_level);
+        return PAL_REFUSE(diag, "%s.start_level: %d, wanted 0 to %d as levels is %d", item->path, adaptive->start_level,
+                          adaptive->n_level - 1, adaptive->n_level);
     PAL_TRY(pal_entry_read_number(item, "thickness_m", 1e-9, 1e9, &out->thickness_m, diag));
     PAL_TRY(pal_entry_read_number(item, "mass_kg", 1e-30, 1e30, &adaptive->mass_kg, diag));
     PAL_TRY(pal_entry_read_number(item, "k_spring_N_m", 1e-30, 1e60, &out->k_spring_N_m, diag));
@@ -86,14 +86,13 @@ static pal_err check_surface(const pal_body_def *def, const char *path, pal_diag
 {
     const pal_surface *surface = &def->mesh->surface;
     if (surface->n_tri < 1)
-        return pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED,
-            "body \"%s\" %s: a mesh with %d surface triangles; \"adaptive_springs\" is made of them", def->name, path,
-            surface->n_tri);
+        return PAL_REFUSE(diag,
+                          "body \"%s\" %s: a mesh with %d surface triangles; \"adaptive_springs\" is made of them",
+                          def->name, path, surface->n_tri);
     for (int i = 0; i < 3 * surface->n_tri; i++)
         if (surface->tri[i] < 0 || surface->tri[i] >= surface->n_vertex)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" %s: triangle %d has corner %d of %d vertices",
-                                      def->name, path, i / 3, surface->tri[i], surface->n_vertex);
+            return PAL_REFUSE(diag, "body \"%s\" %s: triangle %d has corner %d of %d vertices", def->name, path, i / 3,
+                              surface->tri[i], surface->n_vertex);
     return PAL_ERR_OK;
 }
 

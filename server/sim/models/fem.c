@@ -37,8 +37,8 @@ static pal_err read_keys(pal_config_entry *item, const pal_build *build, fem_cho
     to->element = names[kind], to->n_corner = corners[kind];
     to->hex = to->n_corner == 8;
     if (to->hex && mesh->hexes.n_hex == 0)
-        return pal_diagnostic_set(
-            build->diag, PAL_ERR_REFUSED,
+        return PAL_REFUSE(
+            build->diag,
             "body \"%s\" %s.element: \"%s\" needs a mesh of voxels and this one has no hexahedra; prepare "
             "it from its surface with `palpate prepare --model fem`, or take tet4",
             build->body->name, item->path, to->element);
@@ -173,8 +173,7 @@ static pal_err lump_mass(const pal_build *build)
     }
     for (int i = 0; i < body->n_node; i++)
         if (!(body->mass_kg[i] > 0))
-            return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "body \"%s\": node %d has mass %g kg", body->name,
-                                      i, body->mass_kg[i]);
+            return PAL_REFUSE(build->diag, "body \"%s\": node %d has mass %g kg", body->name, i, body->mass_kg[i]);
     return PAL_ERR_OK;
 }
 

@@ -88,57 +88,18 @@ static pal_err keep_boundary(const boundary *from, pal_build *build)
     return PAL_ERR_OK;
 }
 
-/* triangles of a face as the cell of one use sees it, quads cut by their shorter diagonal, others as fans */
-static void add_face(const pal_cells *cells, int32_t use, boundary *b)
-{
-    const pal_edge_use *corner = cells->edge_use + cells->face_use[use].first_use;
-    int n = cells->face_use[use + 1].first_use - cells->face_use[use].first_use, from = 0;
-    const double *x[4];
-    for (int k = 0; k < 4 && n == 4; k++) x[k] = cells->x + 3 * (size_t)corner[k].vertex;
-    if (n == 4 && pal_dist3(x[1], x[3]) < pal_dist3(x[0], x[2])) from = 1;
-    for (int k = 1; k + 1 < n; k++) {
-        int32_t *tri = b->surface.tri + 3 * (size_t)b->surface.n_tri;
-        for (int c = 0; c < 3; c++) tri[c] = corner[(from + (c == 0 ? 0 : k + c - 1)) % n].vertex;
-        b->face[b->surface.n_tri++] = cells->face_use[use].face;
-    }
-}
-
-/* vertices of the triangles alone, numbered in ascending order */
-static void number_vertices(const pal_cells *cells, int32_t *place, boundary *b)
-{
-    for (int i = 0; i < 3 * b->surface.n_tri; i++) place[b->surface.tri[i]] = 1;
-    for (int32_t i = 0; i < cells->n_vertex; i++) {
-        if (!place[i]) continue;
-        memcpy(b->surface.x + 3 * (size_t)b->surface.n_vertex, cells->x + 3 * (size_t)i, 3 * sizeof(double));
-        b->node[b->surface.n_vertex] = i;
-        place[i] = b->surface.n_vertex++;
-    }
-    for (int i = 0; i < 3 * b->surface.n_tri; i++) b->surface.tri[i] = place[b->surface.tri[i]];
-}
-
-/* boundary of the cells that are left: every face with one of them */
+/* boundary of the cells that the cut leaves */
 static pal_err find_cut(const pal_cells *cells, const pal_body_def *def, boundary *b)
 {
-    int32_t *place = calloc((size_t)cells->n_vertex + 1, sizeof *place);
     bool *away = malloc((size_t)cells->n_cell);
-    b->surface.x = malloc(3 * sizeof(double) * (size_t)cells->n_vertex);
-    b->surface.tri = malloc(3 * sizeof(int32_t) * (size_t)cells->n_edge_use);
-    b->node = malloc(sizeof(int32_t) * (size_t)cells->n_vertex);
-    b->face = malloc(sizeof(int32_t) * (size_t)cells->n_edge_use);
-    bool made = place && away && b->surface.x && b->surface.tri && b->node && b->face;
-    for (int32_t c = 0; c < cells->n_cell && made; c++) {
+    for (int32_t c = 0; c < cells->n_cell && away; c++) {
         double middle[3];
         pal_cells_cell_centre(cells, NULL, c, middle);
         away[c] = pal_dot3(def->cut_normal, middle) > def->cut_m;
     }
-    for (int32_t f = 0; f < cells->n_face && made; f++) {
-        const int32_t *use = cells->face[f].use;
-        bool left[2] = {!away[cells->face_use[use[0]].cell], use[1] >= 0 && !away[cells->face_use[use[1]].cell]};
-        if (left[0] != left[1]) add_face(cells, use[left[1]], b);
-    }
-    if (made) number_vertices(cells, place, b);
-    free(place), free(away);
-    return made ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    pal_err err = away ? pal_cells_boundary_of(cells, away, &b->surface, &b->node, &b->face) : PAL_ERR_MEMORY;
+    free(away);
+    return err;
 }
 
 static pal_err show_boundary(const pal_config_entry *item, pal_build *build)
@@ -148,8 +109,7 @@ static pal_err show_boundary(const pal_config_entry *item, pal_build *build)
     pal_err err =
         build->def->cut ? find_cut(cells, build->def, &b) : pal_cells_boundary(cells, &b.surface, &b.node, &b.face);
     if (!err && b.surface.n_tri == 0)
-        err = pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "body \"%s\" %s: the cut leaves nothing of it",
-                                 build->def->name, item->path);
+        err = PAL_REFUSE(build->diag, "body \"%s\" %s: the cut leaves nothing of it", build->def->name, item->path);
     if (!err) err = keep_boundary(&b, build);
     pal_surface_free(&b.surface);
     free(b.node), free(b.face);

@@ -58,8 +58,7 @@ static pal_err add_spring(pal_config_entry *item, pal_spring_kind kind, const pa
     PAL_TRY(pal_entry_read_text(item, "weights", &weights, diag));
     PAL_TRY(is_without_area(item, grid, &without_area, diag));
     if (grid->k_J[kind] && pal_entry_has(item, k_key[kind]))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.%s: stands beside a grid that gives the same", item->path,
-                                  k_key[kind]);
+        return PAL_REFUSE(diag, "%s.%s: stands beside a grid that gives the same", item->path, k_key[kind]);
     if (k_J == 0 || (kind == PAL_SPRING_AREA && without_area)) return PAL_ERR_OK;
     pal_config_entry *row = &out->row[out->n_row++];
     pal_entry_init(row, item->path, effect_name[kind]);
@@ -118,8 +117,8 @@ static pal_err build(pal_config_entry *item, pal_build *build, pal_component_lis
     bool recover = can;
     PAL_TRY(pal_entry_read_bool(item, "recover", &recover, build->diag));
     if (recover && !can)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
-                                  "%s.recover: goes with solver verlet or rk4 and without gravity only", item->path);
+        return PAL_REFUSE(build->diag, "%s.recover: goes with solver verlet or rk4 and without gravity only",
+                          item->path);
     PAL_TRY(pal_entry_check_unused(item, build->diag));
 
     PAL_TRY(pal_body_allocate(body, build->arena, mesh->tets.n_node));
@@ -128,8 +127,7 @@ static pal_err build(pal_config_entry *item, pal_build *build, pal_component_lis
     lump_mass(build->def, &mesh->tets, body->fill, body->mass_kg);
     for (int i = 0; i < body->n_node; i++)
         if (!(body->mass_kg[i] > 0))
-            return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "body \"%s\": node %d has mass %g kg", body->name,
-                                      i, body->mass_kg[i]);
+            return PAL_REFUSE(build->diag, "body \"%s\": node %d has mass %g kg", body->name, i, body->mass_kg[i]);
     body->tets = &mesh->tets;
     body->display.surface = &mesh->surface;
     body->display.skin = mesh->skin.n_vertex > 0 ? &mesh->skin : NULL;

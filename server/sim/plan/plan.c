@@ -12,13 +12,11 @@
 static pal_err fix_rim(pal_body *body, int index, pal_diagnostic *diag)
 {
     if (!body->active)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "body \"%s\" supports[%d].boundary: the model has no surface of its own", body->name,
-                                  index);
+        return PAL_REFUSE(diag, "body \"%s\" supports[%d].boundary: the model has no surface of its own", body->name,
+                          index);
     const pal_levels *levels = body->dofs.levels;
     if (levels->closed)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "body \"%s\" supports[%d].boundary: the surface has no open edge", body->name, index);
+        return PAL_REFUSE(diag, "body \"%s\" supports[%d].boundary: the surface has no open edge", body->name, index);
     for (int i = 0; i < body->n_dof; i++)
         if (pal_levels_on_boundary(levels, i)) body->support[i] = PAL_FIXED;
     return PAL_ERR_OK;
@@ -39,9 +37,7 @@ static pal_err build_body(pal_plan_requests *s, const pal_scene *scene)
     memcpy(name, def->name, PAL_NAME);
     body->name = name;
     const pal_model *model = pal_model_find(def->model.name);
-    if (!model)
-        return pal_diagnostic_set(s->build.diag, PAL_ERR_REFUSED, "body \"%s\": there is no model \"%s\"", body->name,
-                                  def->model.name);
+    if (!model) return PAL_REFUSE(s->build.diag, "body \"%s\": there is no model \"%s\"", body->name, def->model.name);
     pal_config_entry *own = s->own;
     *own = def->model;
     PAL_TRY(model->build(own, &s->build, &s->from_model));
@@ -88,9 +84,8 @@ static pal_err make_components(pal_plan_requests *s, pal_component *list, int *n
     for (int i = 0; i < s->n_request; i++) {
         const pal_effect *effect = s->request[i].effect;
         if (s->build.body->implicit && effect->internal && !effect->tangent)
-            return pal_diagnostic_set(s->build.diag, PAL_ERR_REFUSED,
-                                      "body \"%s\": row \"%s\" has no tangent, which its implicit solver needs", name,
-                                      effect->name);
+            return PAL_REFUSE(s->build.diag, "body \"%s\": row \"%s\" has no tangent, which its implicit solver needs",
+                              name, effect->name);
     }
     /* the OUTPUT component first: its make says what the body shows, which is what tools touch; the SOLVE component
      * last: the others have said what they want of it */
@@ -105,8 +100,7 @@ static pal_err make_components(pal_plan_requests *s, pal_component *list, int *n
             PAL_TRY(pal_plan_requests_make(s, &s->request[i], shown, r));
             n_solve += r->effect->stage == PAL_STAGE_SOLVE;
         }
-    if (n_solve != 1)
-        return pal_diagnostic_set(s->build.diag, PAL_ERR_REFUSED, "body \"%s\": %d solvers, wanted one", name, n_solve);
+    if (n_solve != 1) return PAL_REFUSE(s->build.diag, "body \"%s\": %d solvers, wanted one", name, n_solve);
     return PAL_ERR_OK;
 }
 

@@ -11,22 +11,19 @@ static pal_err add_request(pal_plan_requests *s, pal_config_entry *item, bool re
     const pal_effect *effect = pal_effect_find(item->name);
     const char *body = s->build.body->name;
     if (!effect)
-        return pal_diagnostic_set(s->build.diag, PAL_ERR_REFUSED, "body \"%s\" %s: there is no effect \"%s\"", body,
-                                  item->path, item->name);
+        return PAL_REFUSE(s->build.diag, "body \"%s\" %s: there is no effect \"%s\"", body, item->path, item->name);
     for (int i = 0; i < s->n_request; i++) {
         bool solver = effect->stage == PAL_STAGE_SOLVE && s->request[i].effect->stage == PAL_STAGE_SOLVE;
         if (s->request[i].effect != effect && !solver) continue;
         bool models =
             s->request[i].item >= s->from_model.row && s->request[i].item < s->from_model.row + PAL_ENTRIES_MAX;
         if (!replaces || !models)
-            return pal_diagnostic_set(s->build.diag, PAL_ERR_REFUSED, "body \"%s\" %s: a second row of \"%s\"", body,
-                                      item->path, item->name);
+            return PAL_REFUSE(s->build.diag, "body \"%s\" %s: a second row of \"%s\"", body, item->path, item->name);
         s->request[i] = (pal_plan_request){effect, item};
         return PAL_ERR_OK;
     }
     if (s->n_request == PAL_PLAN_REQUEST_MAX)
-        return pal_diagnostic_set(s->build.diag, PAL_ERR_REFUSED, "body \"%s\": more than %d rows", body,
-                                  PAL_PLAN_REQUEST_MAX);
+        return PAL_REFUSE(s->build.diag, "body \"%s\": more than %d rows", body, PAL_PLAN_REQUEST_MAX);
     s->request[s->n_request++] = (pal_plan_request){effect, item};
     return PAL_ERR_OK;
 }
@@ -38,8 +35,8 @@ static pal_err add_named(pal_plan_requests *s, pal_config_entry *own, const pal_
     *own = *item;
     PAL_TRY(add_request(s, own, true));
     if (pal_effect_find(own->name)->stage != stage)
-        return pal_diagnostic_set(s->build.diag, PAL_ERR_REFUSED, "body \"%s\" %s: \"%s\" is not of stage %s",
-                                  s->build.body->name, own->path, own->name, pal_stage_name(stage));
+        return PAL_REFUSE(s->build.diag, "body \"%s\" %s: \"%s\" is not of stage %s", s->build.body->name, own->path,
+                          own->name, pal_stage_name(stage));
     return PAL_ERR_OK;
 }
 

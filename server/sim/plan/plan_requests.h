@@ -2,7 +2,7 @@
  * only. Thread: [load], and [sim] between steps to switch a component. */
 #ifndef PAL_SIM_PLAN_PLAN_REQUESTS_H
 #define PAL_SIM_PLAN_PLAN_REQUESTS_H
-#include "server/sim/core/model.h"
+#include "server/sim/core/effect_list.h"
 
 /* request of one entry */
 typedef struct pal_plan_request {

@@ -71,23 +71,19 @@ static pal_err check_removable(const pal_plan *plan, int b, const pal_effect *ef
     for (int i = 0; i < plan->n_component; i++)
         n_elastic += plan->component_body[i] == b && elastic(plan->component[i].effect);
     if (effect->stage == PAL_STAGE_SOLVE)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": \"%s\" moves it and cannot be switched off",
-                                  body, effect->name);
+        return PAL_REFUSE(diag, "body \"%s\": \"%s\" moves it and cannot be switched off", body, effect->name);
     if (effect->stage == PAL_STAGE_OUTPUT && strcmp(effect->name, "field_output") != 0)
-        return pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED,
-            "body \"%s\": \"%s\" gives the surface that is shown and touched and cannot be switched "
-            "off",
-            body, effect->name);
+        return PAL_REFUSE(diag,
+                          "body \"%s\": \"%s\" gives the surface that is shown and touched and cannot be switched "
+                          "off",
+                          body, effect->name);
     if (elastic(effect) && n_elastic == 1)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": \"%s\" is the last row that holds it together",
-                                  body, effect->name);
+        return PAL_REFUSE(diag, "body \"%s\": \"%s\" is the last row that holds it together", body, effect->name);
     if (!strcmp(effect->name, "moving_support"))
-        return pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED,
-            "body \"%s\": \"moving_support\" holds nodes of the body's matrix; take it out of the "
-            "scene",
-            body);
+        return PAL_REFUSE(diag,
+                          "body \"%s\": \"moving_support\" holds nodes of the body's matrix; take it out of the "
+                          "scene",
+                          body);
     return PAL_ERR_OK;
 }
 
@@ -196,8 +192,7 @@ pal_err pal_plan_switch(pal_plan *plan, const pal_scene *scene, int b, const cha
                         const pal_material *material, pal_diagnostic *diag, bool *changed)
 {
     *changed = false;
-    if (b < 0 || b >= plan->n_body || b >= scene->n_body)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body %d does not exist", b);
+    if (b < 0 || b >= plan->n_body || b >= scene->n_body) return PAL_REFUSE(diag, "body %d does not exist", b);
     pal_plan_requests *s = calloc(1, sizeof *s);
     pal_scene *now = malloc(sizeof *now);
     pal_err err = s && now ? PAL_ERR_OK : PAL_ERR_MEMORY;
@@ -205,8 +200,7 @@ pal_err pal_plan_switch(pal_plan *plan, const pal_scene *scene, int b, const cha
     if (!err) err = collect(plan, now, b, diag, s);
     int request = err ? -1 : find_request(s, name), at = find_component(plan, b, name);
     if (!err && request < 0)
-        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": nothing in the scene calls for a row \"%s\"",
-                                 plan->body[b].name, name);
+        err = PAL_REFUSE(diag, "body \"%s\": nothing in the scene calls for a row \"%s\"", plan->body[b].name, name);
     if (!err && !on) err = check_removable(plan, b, s->request[request].effect, diag);
     if (!err && on != (at >= 0)) {
         /* the entries as at load, the material as it is by now */

@@ -441,8 +441,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     PAL_TRY(pal_entry_read_choice(item, "preconditioner", preconditioner, 2, &kind, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     if (!body->interpolation || !body->mass_operator)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model subdivision_fem",
-                                  item->path, item->name);
+        return PAL_REFUSE(build->diag, "%s: \"%s\" needs a body of model subdivision_fem", item->path, item->name);
     central *solver = PAL_NEW(build->arena, central, 1);
     if (!solver) return PAL_ERR_MEMORY;
     solver->A = body->interpolation, solver->mass = body->mass_operator;

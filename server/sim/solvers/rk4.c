@@ -477,10 +477,10 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     PAL_TRY(pal_entry_read_number(item, "safety", 0.01, 0.96, &safety, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     if (build->body->interpolation)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
-                                  "%s: \"rk4\" moves nodes, those of this body are carried by control points; take "
-                                  "\"central_cg\" or \"implicit_euler\"",
-                                  item->path);
+        return PAL_REFUSE(build->diag,
+                          "%s: \"rk4\" moves nodes, those of this body are carried by control points; take "
+                          "\"central_cg\" or \"implicit_euler\"",
+                          item->path);
     const pal_body *body = build->body;
     rk4 *solver = PAL_NEW(build->arena, rk4, 1);
     if (!solver) return PAL_ERR_MEMORY;

@@ -119,7 +119,7 @@ static void multiply_true(void *user, const double *p, double *out)
     static_newton *solver = user;
     const pal_body *body = solver->system.body;
     pal_system_true_stiffness(&solver->system, solver->now, solver->low, p, out);
-    if (solver->system.has_contact) pal_system_multiply_contact(&solver->system, 1, 0, p, out);
+    if (solver->system.has_contact) pal_system_multiply_contact(&solver->system, 1, p, out);
     for (int i = 0; i < solver->cg.n; i++)
         out[i] = body->support[i / 3] ? 0 : out[i] + solver->system.mass * body->mass_kg[i / 3] * p[i];
 }
@@ -196,22 +196,19 @@ static pal_err check_supports(static_newton *solver, const pal_build *build)
     }
     const double *x = body->x_rest + 3 * s.unsupported_node;
     if (!solver->relieved)
-        return pal_diagnostic_set(
-            build->diag, PAL_ERR_REFUSED,
-            "body \"%s\": %d of its %d parts (the one at (%g, %g, %g) m) has fewer than three held nodes "
-            "off a line, so it has no state of rest; give supports, or free \"inertia_relief\" to "
-            "static_newton",
-            body->name, s.n_unsupported, s.n_part, x[0], x[1], x[2]);
+        return PAL_REFUSE(build->diag,
+                          "body \"%s\": %d of its %d parts (the one at (%g, %g, %g) m) has fewer than three held nodes "
+                          "off a line, so it has no state of rest; give supports, or free \"inertia_relief\" to "
+                          "static_newton",
+                          body->name, s.n_unsupported, s.n_part, x[0], x[1], x[2]);
     if (body->interpolation)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
-                                  "body \"%s\": inertia_relief is for bodies of nodes, this one has control points",
-                                  body->name);
+        return PAL_REFUSE(
+            build->diag, "body \"%s\": inertia_relief is for bodies of nodes, this one has control points", body->name);
     if (s.n_part > 1 || solver->system.n_free < body->n_node)
-        return pal_diagnostic_set(
-            build->diag, PAL_ERR_REFUSED,
-            "body \"%s\": inertia_relief is for one part without held nodes, this body has %d parts and "
-            "%d held nodes",
-            body->name, s.n_part, body->n_node - solver->system.n_free);
+        return PAL_REFUSE(build->diag,
+                          "body \"%s\": inertia_relief is for one part without held nodes, this body has %d parts and "
+                          "%d held nodes",
+                          body->name, s.n_part, body->n_node - solver->system.n_free);
     return PAL_ERR_OK;
 }
 
@@ -219,10 +216,10 @@ static pal_err make_factors(static_newton *solver, pal_build *build)
 {
     pal_body *body = build->body;
     if (body->interpolation && (solver->linear == LINEAR_DIRECT || solver->linear == LINEAR_INCOMPLETE))
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
-                                  "body \"%s\": static_newton with linear \"%s\" is for bodies of nodes, this one has "
-                                  "control points; take \"pcg\"",
-                                  body->name, solver->linear == LINEAR_DIRECT ? "direct" : "incomplete");
+        return PAL_REFUSE(build->diag,
+                          "body \"%s\": static_newton with linear \"%s\" is for bodies of nodes, this one has "
+                          "control points; take \"pcg\"",
+                          body->name, solver->linear == LINEAR_DIRECT ? "direct" : "incomplete");
     if (body->interpolation) solver->linear = LINEAR_PCG;
     PAL_TRY(pal_system_pattern(&solver->system, build->arena, &solver->blocks));
     PAL_TRY(pal_node_rotations_make(&solver->system, build->arena, &solver->rotations));
@@ -237,8 +234,7 @@ static pal_err make_factors(static_newton *solver, pal_build *build)
         err = pal_compliance_solver_make(&solver->system, &solver->rotations, &solver->blocks, build->arena,
                                          &solver->compliance);
     if (err == PAL_ERR_NUMERIC)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
-                                  "body \"%s\": its stiffness at rest is not positive definite", body->name);
+        return PAL_REFUSE(build->diag, "body \"%s\": its stiffness at rest is not positive definite", body->name);
     return err;
 }
 
@@ -310,7 +306,7 @@ static pal_err find_residual(static_newton *solver, pal_step *step, double *size
     memcpy(r, body->g, pal_body_bytes3(solver->system.body));
     if (solver->system.has_contact) {
         for (int i = 0; i < solver->cg.n; i++) p[i] = body->x[i] - solver->x0[i];
-        pal_system_multiply_contact(&solver->system, -1, 0, p, r);
+        pal_system_multiply_contact(&solver->system, -1, p, r);
     }
     for (int i = 0; i < body->n_dof; i++) {
         loads += pal_norm3(solver->external_force + 3 * i);
@@ -357,7 +353,7 @@ static energy potential(static_newton *solver)
     if (solver->relieved) add_energy(&all, -pal_dot_product(solver->cg.n, solver->inertia, p));
     if (solver->system.has_contact) {
         memset(q, 0, pal_body_bytes3(solver->system.body));
-        pal_system_multiply_contact(&solver->system, 1, 0, p, q);
+        pal_system_multiply_contact(&solver->system, 1, p, q);
         add_energy(&all, 0.5 * pal_dot_product(solver->cg.n, p, q));
     }
     return all;
@@ -588,8 +584,7 @@ static pal_err material(void *self, const pal_body *body, const pal_material *to
     pal_system_linearise_rest(&solver->system);
     pal_err err = pal_compliance_solver_factor(&solver->compliance, &solver->blocks, false);
     if (err == PAL_ERR_NUMERIC)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": its stiffness at rest is not positive definite",
-                                  body->name);
+        return PAL_REFUSE(diag, "body \"%s\": its stiffness at rest is not positive definite", body->name);
     return err;
 }
 

@@ -11,7 +11,7 @@
 #define PAL_HEAVY_LOSS 0.01
 /* static_newton: operations of a factor per entry that are worth one iteration with it, a product and two triangular
  * passes (tests/sim/solvers/test_fem_static.c) */
-#define PAL_FACTOR_FLOPS_PER_ENTRY 20.0
+enum { PAL_FACTOR_FLOPS_PER_ENTRY = 20 };
 /* static_newton: an iteration that leaves more of the residual is slow, and conjugate gradients on the true stiffness
  * that leave more have failed (tests/sim/solvers/test_fem_static.c) */
 #define PAL_NEWTON_SLOW 0.1

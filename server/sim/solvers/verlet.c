@@ -32,10 +32,10 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     PAL_TRY(pal_entry_read_number(item, "safety", 0.01, 0.9, &safety, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     if (build->body->interpolation)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
-                                  "%s: \"verlet\" moves nodes, those of this body are carried by control points; take "
-                                  "\"central_cg\" or \"implicit_euler\"",
-                                  item->path);
+        return PAL_REFUSE(build->diag,
+                          "%s: \"verlet\" moves nodes, those of this body are carried by control points; take "
+                          "\"central_cg\" or \"implicit_euler\"",
+                          item->path);
     verlet *solver = PAL_NEW(build->arena, verlet, 1);
     if (!solver) return PAL_ERR_MEMORY;
     if (!PAL_NEW_DOUBLES(build->arena, build->body->n_dof, &solver->stiff, &solver->damp)) return PAL_ERR_MEMORY;

@@ -118,7 +118,7 @@ void pal_adaptive_grasp_goal(pal_adaptive_grasp *l, const double quat[4], const 
             pal_sub3(was, was, l->y), pal_axpy3(was, -l->dt_s, v);
         }
         for (int c = 0; c < 3; c++) l->shift[c] = l->k_N_m / k_N_m * was[c] - (goal[c] - y[c]);
-        l->left_s = PAL_BLEND_GRASP_NODES_S;
+        l->left_s = PAL_BLEND_S;
     }
     if (!pal_finite3(l->shift)) pal_set3(l->shift, 0, 0, 0);
     pal_add3(goal, goal, l->shift);

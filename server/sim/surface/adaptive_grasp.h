@@ -7,7 +7,7 @@
  * whatever its history; only where all of it is finer than this surface and than one in between, the ends of the
  * coarser one's edges continue. o follows the held tissue's position at rest, rotated as the body was at the begin. The
  * force is continuous at a change of nodes, and of k, which depends on the solver's sub-step: F = k (tool + o + shift -
- * y), where shift fades in PAL_BLEND_GRASP_NODES_S. Memory: the caller's, `known` is heap. Thread: [sim]. */
+ * y), where shift fades in PAL_BLEND_S. Memory: the caller's, `known` is heap. Thread: [sim]. */
 #ifndef PAL_SIM_SURFACE_ADAPTIVE_GRASP_H
 #define PAL_SIM_SURFACE_ADAPTIVE_GRASP_H
 #include "server/sim/core/body.h"

@@ -24,10 +24,10 @@ enum { CHAIN = 1 << (PAL_LEVELS_MAX - 1), FRESH = 3 * CHAIN };
 static pal_err check_options(const pal_adaptive_options *o, pal_diagnostic *diag)
 {
     if (!(o->mass_kg > 0) || !isfinite(o->mass_kg))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "adaptive surface: a mass of %g kg", o->mass_kg);
+        return PAL_REFUSE(diag, "adaptive surface: a mass of %g kg", o->mass_kg);
     if (o->n_level >= 1 && (o->start_level < 0 || o->start_level >= o->n_level))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "adaptive surface: start level %d, there are levels 0 to %d",
-                                  o->start_level, o->n_level - 1);
+        return PAL_REFUSE(diag, "adaptive surface: start level %d, there are levels 0 to %d", o->start_level,
+                          o->n_level - 1);
     return PAL_ERR_OK;
 }
 
@@ -96,7 +96,7 @@ static bool get_state(pal_adaptive_surface *s, pal_arena *arena)
            s->slot && s->tri && s->log && s->chain && s->fresh;
 }
 
-static double mean_edge(const pal_levels *l, int level)
+double pal_adaptive_mean_edge_m(const pal_levels *l, int level)
 {
     double sum = 0;
     for (int32_t e = l->first_edge[level]; e < l->first_edge[level + 1]; e++)
@@ -116,17 +116,16 @@ static pal_err make_body(pal_adaptive_surface *s, pal_body *body, pal_arena *are
     body->model.adaptive = s;
     body->display.surface = &s->surface;
     body->active = s->node;
-    body->edge_m = mean_edge(l, s->options.start_level);
+    body->edge_m = pal_adaptive_mean_edge_m(l, s->options.start_level);
     return PAL_ERR_OK;
 }
 
 static pal_err refuse_bytes(int n_level, const char *what, size_t n_byte, size_t budget, pal_diagnostic *diag)
 {
-    return pal_diagnostic_set(
-        diag, PAL_ERR_BUDGET,
-        "adaptive surface: %d levels need %s%.4g MiB, the budget is %.4g MiB: ask for fewer levels or a coarser "
-        "surface",
-        n_level, what, (double)n_byte / (1 << 20), (double)budget / (1 << 20));
+    return pal_diagnostic_set(diag, PAL_ERR_BUDGET,
+                              "adaptive surface: %d levels need %s%.4g MiB, the budget is %.4g MiB: ask for fewer "
+                              "levels or a coarser surface",
+                              n_level, what, (double)n_byte / (1 << 20), (double)budget / (1 << 20));
 }
 
 pal_err pal_adaptive_make(const pal_surface *surface, const pal_adaptive_options *options, pal_body *body,
@@ -204,10 +203,8 @@ static bool edge_normal(const pal_levels *l, int32_t e, const double *x, double 
         int32_t f = l->edge[e].face[side];
         if (f < 0) continue;
         const int32_t *c = l->face + 3 * (size_t)f;
-        double u[3], v[3], a[3];
-        pal_sub3(u, x + 3 * (size_t)c[1], x + 3 * (size_t)c[0]);
-        pal_sub3(v, x + 3 * (size_t)c[2], x + 3 * (size_t)c[0]);
-        pal_cross3(a, u, v);
+        double a[3];
+        pal_normal3(a, x + 3 * (size_t)c[0], x + 3 * (size_t)c[1], x + 3 * (size_t)c[2]);
         pal_add3(n, n, a);
     }
     return pal_unit3(n, n, 0);

@@ -96,6 +96,7 @@ typedef struct pal_adaptive_surface {
  * [load] */
 pal_err pal_adaptive_make(const pal_surface *surface, const pal_adaptive_options *options, pal_body *body,
                           pal_arena *arena, pal_diagnostic *diag, pal_adaptive_surface **out);
+double pal_adaptive_mean_edge_m(const pal_levels *levels, int level); /* at rest */
 /* pal_dofs.check_memory */
 pal_err pal_adaptive_check_bytes(const pal_adaptive_surface *adaptive, size_t n_byte, pal_diagnostic *diag);
 

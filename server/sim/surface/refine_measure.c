@@ -21,11 +21,8 @@ static void add_normals(double *sum, const pal_adaptive_surface *adaptive, const
 {
     for (int t = 0; t < adaptive->n_tri; t++) {
         const int32_t *c = adaptive->tri + 3 * (size_t)t;
-        const double *a = x + 3 * (size_t)c[0];
-        double ab[3], ac[3], n[3];
-        pal_sub3(ab, x + 3 * (size_t)c[1], a);
-        pal_sub3(ac, x + 3 * (size_t)c[2], a);
-        pal_cross3(n, ab, ac);
+        double n[3];
+        pal_normal3(n, x + 3 * (size_t)c[0], x + 3 * (size_t)c[1], x + 3 * (size_t)c[2]);
         for (int k = 0; k < 3; k++) {
             double *to = sum + 8 * (size_t)c[k];
             pal_add3(to, to, n);

@@ -9,7 +9,6 @@
 #include "server/num/polar.h"
 #include "server/sim/core/rigid_motion.h"
 #include "server/sim/surface/active_nodes.h"
-#include "server/sim/surface/tuning.h"
 
 #include <math.h>
 
@@ -45,7 +44,7 @@ static void fit(const pal_adaptive_surface *s, const double from[3], sums t, pal
     if (!(length > 0.5 && length < 2)) q[0] = 1, q[1] = q[2] = q[3] = 0;
     /* a body in a point has neither rotation nor spin */
     for (int k = 0; k < 9; k++) size += t.a[k] * t.a[k];
-    if (size > SMALL * SMALL * s->rest_kg_m2 * s->rest_kg_m2) pal_polar_rotation(t.a, q, 40);
+    if (size > PAL_ROUNDING * PAL_ROUNDING * s->rest_kg_m2 * s->rest_kg_m2) pal_polar_rotation(t.a, q, 40);
     pal_quat_matrix(q, frame->R);
     pal_scale3(c, 1 / t.mass, t.x);
     pal_scale3(frame->V_m_s, 1 / t.mass, t.v);
@@ -56,7 +55,7 @@ static void fit(const pal_adaptive_surface *s, const double from[3], sums t, pal
     double xx = t.square[0] - c[0] * t.x[0], yy = t.square[1] - c[1] * t.x[1], zz = t.square[2] - c[2] * t.x[2];
     double xy = t.square[3] - c[0] * t.x[1], xz = t.square[4] - c[0] * t.x[2], yz = t.square[5] - c[1] * t.x[2];
     const double inertia[9] = {yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy};
-    pal_rigid_spin(inertia, moment, SMALL * SMALL * s->rest_kg_m2, frame->Omega_1_s);
+    pal_rigid_spin(inertia, moment, PAL_ROUNDING * PAL_ROUNDING * s->rest_kg_m2, frame->Omega_1_s);
 }
 
 void pal_adaptive_fit_rigid(const pal_adaptive_surface *s, const pal_body *body, pal_rigid_fit *frame)

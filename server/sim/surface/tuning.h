@@ -5,8 +5,6 @@
 
 /* bytes for a body with its components and display where the scene gives none (test_adaptive_surface) */
 #define BUDGET_BYTES ((size_t)512 << 20)
-/* of a body's size at rest: less is rounding, and the body is a point (test_adaptive_geometry) */
-#define SMALL 1e-10
 /* sizes. A finest vertex takes more than COMPONENT_BYTES in components (edge_spring, rk4) and display, whatever the
  * body; entries of the log of changed slots */
 enum { COMPONENT_BYTES = 400, LOG_MIN = 1024, LOG_MAX = 65536 };

@@ -32,9 +32,7 @@ static pal_err make_bare(const pal_scene *scene, int index, pal_diagnostic *diag
 {
     const pal_body_def *def = &scene->body[index];
     const pal_model *model = pal_model_find(def->model.name);
-    if (!model)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": there is no model \"%s\"", def->name,
-                                  def->model.name);
+    if (!model) return PAL_REFUSE(diag, "body \"%s\": there is no model \"%s\"", def->name, def->model.name);
     out->arena = pal_arena_create(1 << 16, true);
     pal_component_list *list = malloc(sizeof *list);
     pal_config_entry item = def->model;
@@ -185,11 +183,10 @@ static pal_err make(const pal_scene *from, const pal_scene *to, int body, pal_di
     t->same_control_points = a->body.interpolation && b->body.interpolation && same_cells(from, to, body);
     t->n_from = a->body.n_node, t->n_to = b->body.n_node, t->n_dof = b->body.n_dof;
     if (!a->body.active != !b->body.active)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "body \"%s\": a surface that adapts and a full body are no one thing",
-                                  from->body[body].name);
+        return PAL_REFUSE(diag, "body \"%s\": a surface that adapts and a full body are no one thing",
+                          from->body[body].name);
     if (t->adaptive && !same_surface(&from->body[body].mesh->surface, &to->body[body].mesh->surface))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": another surface", from->body[body].name);
+        return PAL_REFUSE(diag, "body \"%s\": another surface", from->body[body].name);
     PAL_TRY(allocate(t));
     if (t->adaptive) return PAL_ERR_OK;
     PAL_TRY(make_locate(a, diag));

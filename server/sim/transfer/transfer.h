@@ -16,8 +16,8 @@
  * rest (of a free body, from the best-fitting rigid placement) is scaled, and the velocity for the difference that
  * remains, both by at most PAL_TRANSFER_MAX_SCALE. A body at rest whose scale reaches its bound has a different energy,
  * which the report shows. A body that rests under a load with the same elastic energy is about half way between its old
- * and its new equilibrium; the other half follows as the difference of forces is released (blend_component.h). A free
- * body keeps its momentum and angular momentum.
+ * and its new equilibrium; the other half follows as the difference of forces is released (inserted_components.h). A
+ * free body keeps its momentum and angular momentum.
  *
  * Display. The offset from what the new body would show to what the old one showed is released with the forces
  * (pal_world_blend_display), so that nothing jumps and tools touch what is shown.

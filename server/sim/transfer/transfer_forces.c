@@ -3,7 +3,6 @@
 
 #include "server/base/vec3.h"
 #include "server/sim/implicit/system.h"
-#include "server/sim/transfer/tuning.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -37,7 +36,7 @@ static bool find_dependents(const pal_interpolation *in, int n_from, dependents 
 static void add_spread(const pal_transfer *t, const pal_body *from, const pal_body *to, const dependents *l, int i,
                        pal_interpolation_builder *rows)
 {
-    double sum = 0, min = from->node_mass_kg[i] / PAL_TRANSFER_MASS_RATIO;
+    double sum = 0, min = from->node_mass_kg[i] / PAL_CHANGE_MAX;
     for (int32_t k = l->first[i]; k < l->first[i + 1]; k++) sum += l->weight[k] * to->node_mass_kg[l->who[k]];
     double part = sum >= min ? 1 : sum > 0 ? sum / min : 0;
     for (int32_t k = l->first[i]; k < l->first[i + 1] && part > 0; k++)
@@ -105,7 +104,7 @@ static void limit_acceleration(pal_transfer *t, const pal_body *from, const pal_
         for (int32_t k = A->start[i]; k < A->start[i + 1]; k++)
             mass[A->point[k]] += A->weight[k] * from->node_mass_kg[i];
     for (int j = 0; j < to->n_node; j++) {
-        double part = PAL_TRANSFER_MASS_RATIO * to->node_mass_kg[j] / mass[j];
+        double part = PAL_CHANGE_MAX * to->node_mass_kg[j] / mass[j];
         if (part < 1) pal_axpy3(t->force + 3 * (size_t)j, part - 1, unbalanced + 3 * (size_t)j);
     }
 }

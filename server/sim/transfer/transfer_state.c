@@ -13,9 +13,6 @@
 #include <float.h>
 #include <string.h>
 
-/* relative difference of energies that counts as none: an energy is quadratic in a solution of this accuracy */
-static const double same_energy = PAL_SOLVER_TOLERANCE * PAL_SOLVER_TOLERANCE;
-
 /* ---- sums ---- */
 
 static bool elastic(const pal_effect *e)
@@ -222,7 +219,7 @@ static int smooth(pal_transfer *t, pal_world *next, double want_J)
     int n_max = now_J > PAL_TRANSFER_MAX_SCALE * want_J ? 5 * PAL_TRANSFER_ROUNDS
                 : t->has_rehearsed                      ? PAL_TRANSFER_ROUNDS / 4
                                                         : PAL_TRANSFER_ROUNDS;
-    for (; n < n_max && now_J > (1 + same_energy) * want_J && now_J < max_J; n++) {
+    for (; n < n_max && now_J > (1 + PAL_SOLVER_TOLERANCE * PAL_SOLVER_TOLERANCE) * want_J && now_J < max_J; n++) {
         for (int k = 0; k < to->n_active; k++) {
             int i = pal_body_point(to, k);
             if (to->support[i] || !(t->bound[i] > 0)) continue;
@@ -273,7 +270,8 @@ static double scale_displacement(pal_transfer *t, pal_world *next, double want_J
     memcpy(base, to->x, 3 * sizeof *base * (size_t)to->n_dof);
     for (int round = 0; round < PAL_TRANSFER_SCALE_ROUNDS; round++) {
         double now_J = elastic_energy_J(next, t->body);
-        if (!(now_J > 0) || !(want_J > 0) || fabs(now_J / want_J - 1) <= same_energy) break;
+        if (!(now_J > 0) || !(want_J > 0) || fabs(now_J / want_J - 1) <= PAL_SOLVER_TOLERANCE * PAL_SOLVER_TOLERANCE)
+            break;
         /* the energy goes with a power of the length: 2 where little is bent, more beyond */
         if (last_J > 0 && s != last_s && now_J != last_J) power = log(now_J / last_J) / log(s / last_s);
         power = fmin(fmax(power, 1), 8);
@@ -394,7 +392,7 @@ void pal_transfer_apply(pal_transfer *transfer, pal_world *next, const pal_world
     pal_body *from = &old->plan.body[t->body], *to = &next->plan.body[t->body];
     *out = (pal_transfer_report){.scale = 1};
     double elastic_before_J = evaluate_old(t, old, &out->energy_before_J), kinetic_J = pal_body_kinetic_J(from);
-    double spare_J = same_energy * (elastic_before_J + kinetic_J);
+    double spare_J = PAL_SOLVER_TOLERANCE * PAL_SOLVER_TOLERANCE * (elastic_before_J + kinetic_J);
     place_points(t, from, next);
     pal_world_transfer(next, before, t->body, t->x, t->v);
     out->interpolated_J = world_energy_J(next);

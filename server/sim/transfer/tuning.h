@@ -8,9 +8,6 @@
 /* share of a node's last move in the next round of smoothing (Polyak's heavy ball; stable below 1, as forces over
  * bounds of stiffness have no eigenvalue above 1) (tests/stability/test_switch_slider.c) */
 #define PAL_TRANSFER_INERTIA 0.8
-/* mass of old nodes over that of the new ones which take over their force, from which on it is a force too much: the
- * new nodes would be thrown (tests/stability/test_switch_pairs.c) */
-#define PAL_TRANSFER_MASS_RATIO 2.0
 
 enum {
     /* rounds of smoothing, each an evaluation of forces; a quarter of them after a rehearsal, five times as many where

@@ -1,5 +1,5 @@
-/* Component blend (blend_component.h). */
-#include "server/sim/world/blend_component.h"
+/* Component blend (inserted_components.h). */
+#include "server/sim/world/inserted_components.h"
 
 #include "server/base/vec3.h"
 #include "server/sim/core/blend.h"
@@ -105,14 +105,14 @@ static pal_err make(void *user, pal_plan *plan, int b, pal_arena *arena, void **
     return PAL_ERR_OK;
 }
 
-static void remove_component(pal_blend_components *blends, pal_plan *plan, int b)
+static void remove_component(pal_inserted *blends, pal_plan *plan, int b)
 {
     set_display(blends->self[b], 0);
     pal_plan_remove(plan, blends->self[b]);
     blends->self[b] = NULL;
 }
 
-static pal_err change(pal_blend_components *blends, pal_plan *plan, int body, blend_start from)
+static pal_err change(pal_inserted *blends, pal_plan *plan, int body, blend_start from)
 {
     void *self;
     PAL_TRY(pal_plan_add(plan, body, &pal_effect_blend, make, &from, &self));
@@ -122,7 +122,7 @@ static pal_err change(pal_blend_components *blends, pal_plan *plan, int body, bl
     return PAL_ERR_OK;
 }
 
-pal_err pal_blend_components_set(pal_blend_components *rows, pal_plan *plan, int body, const double *force_N)
+pal_err pal_blend_components_set(pal_inserted *rows, pal_plan *plan, int body, const double *force_N)
 {
     const pal_body *b = &plan->body[body];
     PAL_TRY(change(rows, plan, body, (blend_start){force_N, b->display.offset_m, b->display.offset_part}));
@@ -131,21 +131,20 @@ pal_err pal_blend_components_set(pal_blend_components *rows, pal_plan *plan, int
     return PAL_ERR_OK;
 }
 
-pal_err pal_blend_components_set_display(pal_blend_components *rows, pal_plan *plan, int body,
-                                         const float *display_offset_m)
+pal_err pal_blend_components_set_display(pal_inserted *rows, pal_plan *plan, int body, const float *display_offset_m)
 {
     const blend *was = rows->self[body];
     const double *force_N = was && !was->begun ? was->force_N : NULL;
     return change(rows, plan, body, (blend_start){force_N, display_offset_m, 1});
 }
 
-void pal_blend_components_add(const pal_blend_components *rows, int body, double scale, double *load)
+void pal_blend_components_add(const pal_inserted *rows, int body, double scale, double *load)
 {
     const blend *state = rows->self[body];
     if (state) add_load(state, scale * state->share, load);
 }
 
-void pal_blend_components_remove_idle(pal_blend_components *rows, pal_plan *plan)
+void pal_blend_components_remove_idle(pal_inserted *rows, pal_plan *plan)
 {
     for (int b = 0; b < PAL_BODY_MAX; b++)
         if (rows->self[b] && ((const blend *)rows->self[b])->share == 0) remove_component(rows, plan, b);

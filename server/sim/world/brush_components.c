@@ -1,5 +1,5 @@
 /* Components `brush` inserted and removed at run time. */
-#include "server/sim/world/brush_components.h"
+#include "server/sim/world/inserted_components.h"
 
 /* what a new component starts with: the brush of a slot, or the brushes of another component on body `from` */
 typedef struct brush_start {
@@ -19,13 +19,11 @@ static pal_err make(void *user, pal_plan *plan, int b, pal_arena *arena, void **
     return PAL_ERR_OK;
 }
 
-pal_err pal_brush_components_set(pal_brush_components *rows, pal_plan *plan, int body, int slot, const pal_brush *brush,
+pal_err pal_brush_components_set(pal_inserted *rows, pal_plan *plan, int body, int slot, const pal_brush *brush,
                                  pal_diagnostic *diag)
 {
-    if (body < 0 || body >= plan->n_body)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body %d does not exist", body);
-    if (slot < 0 || slot >= PAL_TOOL_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "tool %d does not exist", slot);
+    if (body < 0 || body >= plan->n_body) return PAL_REFUSE(diag, "body %d does not exist", body);
+    if (slot < 0 || slot >= PAL_TOOL_MAX) return PAL_REFUSE(diag, "tool %d does not exist", slot);
     if (!brush || brush->kind == PAL_BRUSH_NONE) {
         if (rows->self[body]) pal_brush_end(rows->self[body], slot);
         return PAL_ERR_OK;
@@ -37,8 +35,7 @@ pal_err pal_brush_components_set(pal_brush_components *rows, pal_plan *plan, int
     return pal_diagnostic_set(diag, err, "no memory for a brush on body \"%s\"", plan->body[body].name);
 }
 
-void pal_brush_components_transfer(pal_brush_components *rows, pal_plan *plan, const pal_brush_components *before,
-                                   const pal_plan *from)
+void pal_brush_components_transfer(pal_inserted *rows, pal_plan *plan, const pal_inserted *before, const pal_plan *from)
 {
     for (int b = 0; b < plan->n_body && b < from->n_body; b++) {
         brush_start start = {.before = before->self[b], .from = &from->body[b]};
@@ -47,13 +44,13 @@ void pal_brush_components_transfer(pal_brush_components *rows, pal_plan *plan, c
     }
 }
 
-void pal_brush_components_end(pal_brush_components *rows, int slot)
+void pal_brush_components_end(pal_inserted *rows, int slot)
 {
     for (int b = 0; b < PAL_BODY_MAX; b++)
         if (rows->self[b]) pal_brush_end(rows->self[b], slot);
 }
 
-void pal_brush_components_remove_idle(pal_brush_components *rows, pal_plan *plan)
+void pal_brush_components_remove_idle(pal_inserted *rows, pal_plan *plan)
 {
     for (int b = 0; b < PAL_BODY_MAX; b++) {
         if (!rows->self[b] || !pal_brush_gone(rows->self[b])) continue;
@@ -62,7 +59,7 @@ void pal_brush_components_remove_idle(pal_brush_components *rows, pal_plan *plan
     }
 }
 
-size_t pal_brush_components_bytes(const pal_brush_components *rows)
+size_t pal_brush_components_bytes(const pal_inserted *rows)
 {
     size_t n_byte = 0;
     for (int b = 0; b < PAL_BODY_MAX; b++)

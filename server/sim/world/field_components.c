@@ -1,5 +1,5 @@
 /* Components field_output inserted and removed at run time. */
-#include "server/sim/world/field_components.h"
+#include "server/sim/world/inserted_components.h"
 
 #include "server/sim/core/effect_list.h"
 
@@ -15,11 +15,10 @@ bool pal_field_components_given(const pal_plan *plan, int body, pal_field field)
 
 static pal_err refuse(const pal_plan *plan, int body, pal_field field, pal_diagnostic *diag)
 {
-    if (body < 0 || body >= plan->n_body)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body %d does not exist", body);
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" gives no %s: its model has no %s",
-                              plan->body[body].name, pal_field_title(field),
-                              field == PAL_FIELD_STIFFNESS_J ? "edges that are springs" : "finite elements");
+    if (body < 0 || body >= plan->n_body) return PAL_REFUSE(diag, "body %d does not exist", body);
+    return PAL_REFUSE(diag, "body \"%s\" gives no %s: its model has no %s", plan->body[body].name,
+                      pal_field_title(field),
+                      field == PAL_FIELD_STIFFNESS_J ? "edges that are springs" : "finite elements");
 }
 
 pal_err pal_field_components_check(const pal_plan *plan, pal_diagnostic *diag)
@@ -54,7 +53,7 @@ pal_err pal_field_components_add(pal_field_components *rows, pal_plan *plan, int
     if (!pal_field_components_given(plan, body, field)) return refuse(plan, body, field, diag);
     if (plan->body[body].display.field[field]) return PAL_ERR_OK;
     field_start start = {pal_effect_find("field_output"), field, diag};
-    if (!start.effect) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "this build has no effect \"field_output\"");
+    if (!start.effect) return PAL_REFUSE(diag, "this build has no effect \"field_output\"");
     pal_err err = pal_plan_add(plan, body, start.effect, make, &start, &rows->self[body][field]);
     if (err)
         return pal_diagnostic_set(diag, err, "no memory for the %s of body \"%s\"", pal_field_title(field),

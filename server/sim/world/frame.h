@@ -24,12 +24,9 @@ typedef struct pal_frame_part {
     uint64_t revision; /* of the topology these positions belong to */
     bool frozen;
     char reason[PAL_REASON_TEXT]; /* one sentence while frozen, else empty */
-    /* since the body's reset: interventions that kept it within its bounds (safeguards.h), their total and their
-     * time */
-    pal_safeguards safeguards;
-    uint64_t n_safeguard, safeguard_ns;
-    bool asleep;       /* at rest: its components do not run until something comes near (component sleep) */
-    uint64_t n_output; /* OUTPUT runs of the body so far; unchanged: nothing here was recomputed */
+    pal_safeguards safeguards;    /* since the body's reset: interventions that kept it within its bounds */
+    bool asleep;                  /* at rest: its components do not run until something comes near (component sleep) */
+    uint64_t n_output;            /* OUTPUT runs of the body so far; unchanged: nothing here was recomputed */
     pal_frame_field field[PAL_FIELD_COUNT]; /* by pal_field */
     /* Adaptive bodies (adaptive_surface.h): the table of drawn triangles at this revision, 0 0 0 in empty slots.
      * Vertices of no triangle are hidden and their positions are undefined. n_slot 0: the triangles never change */

@@ -104,12 +104,11 @@ pal_err pal_world_check_budget(pal_world *w, pal_diagnostic *diag)
     if (!(limit > 0) || n > w->max_substep) {
         char who[120];
         pal_world_describe_limit(w, who, sizeof who);
-        return pal_diagnostic_set(
-            diag, PAL_ERR_BUDGET,
-            "a step of %g s needs %.0f sub-steps of %.3g s%s%s, max_substep allows %d: take a softer or "
-            "denser material, larger elements%s or a shorter step",
-            w->step_s, ceil(w->step_s / limit), limit, is_adaptive ? " on the finest level" : "", who, w->max_substep,
-            is_adaptive ? ", fewer levels" : "");
+        return pal_diagnostic_set(diag, PAL_ERR_BUDGET,
+                                  "a step of %g s needs %.0f sub-steps of %.3g s%s%s, max_substep allows %d: take a "
+                                  "softer or denser material, larger elements%s or a shorter step",
+                                  w->step_s, ceil(w->step_s / limit), limit, is_adaptive ? " on the finest level" : "",
+                                  who, w->max_substep, is_adaptive ? ", fewer levels" : "");
     }
     w->rest_limit_s = limit;
     return PAL_ERR_OK;
@@ -241,13 +240,16 @@ pal_err pal_world_assemble_forces(pal_world *world, int body)
     return err;
 }
 
-/* a component that fails freezes only its body; true: it has failed */
-static bool fails(pal_world *w, pal_body *body, const pal_component *component, pal_err err)
+/* runs a component, which freezes only its body when it fails; false: it has failed */
+static bool run_component(pal_world *w, pal_component *component, pal_step *step)
 {
-    if (!err) return false;
-    pal_body_stop(body, -1, "row %s: %s", component->effect->name, pal_err_text(err));
-    if (!w->component_err) w->component_err = err;
-    return true;
+    const uint64_t before = pal_clock_ns();
+    component->n_run++;
+    const pal_err err = component->effect->run(component->self, step);
+    component->spent_ns += pal_clock_ns() - before;
+    if (err) pal_body_stop(step->body, -1, "row %s: %s", component->effect->name, pal_err_text(err));
+    if (err && !w->component_err) w->component_err = err;
+    return !err;
 }
 
 /* Lasting loads and tool contact of one body, each node's load within the cap. Loads that an implicit solver returns
@@ -258,11 +260,7 @@ static void run_contact(pal_world *w, pal_step *step, int b)
     pal_body_begin_loads(body);
     if (body->external_force) pal_body_cap_loads(body, true);
     for (int i = 0; i < step->n_contact; i++) {
-        pal_component *component = &w->plan.component[w->plan.first[PAL_STAGE_CONTACT][b] + i];
-        uint64_t before = pal_clock_ns();
-        component->n_run++;
-        if (fails(w, body, component, component->effect->run(component->self, step))) return;
-        component->spent_ns += pal_clock_ns() - before;
+        if (!run_component(w, &w->plan.component[w->plan.first[PAL_STAGE_CONTACT][b] + i], step)) return;
     }
     if (!body->implicit && step->n_contact > 0) pal_body_cap_loads(body, false);
 }
@@ -286,14 +284,12 @@ static void run_substep(pal_world *w, pal_step *shared)
         step.body->safeguards.n_mass_scaled += step.adds_mass;
         run_contact(w, &step, b);
         pal_component *solve = &w->plan.component[w->plan.first[PAL_STAGE_SOLVE][b]];
-        uint64_t before = pal_clock_ns(), forces = force_ns(&step);
-        solve->n_run++;
-        if (!step.body->frozen) (void)fails(w, step.body, solve, solve->effect->run(solve->self, &step));
+        uint64_t before = solve->spent_ns, forces = force_ns(&step);
+        if (!step.body->frozen) (void)run_component(w, solve, &step);
+        if (step.adds_mass) step.body->safeguards.ns += solve->spent_ns - before;
+        solve->spent_ns -= force_ns(&step) - forces;
         /* interpolates the nodes, for contact and for the stages after the step */
         if (step.n_contact > 0 || step.sub == step.n_sub - 1) pal_body_update_nodes(step.body);
-        uint64_t took = pal_clock_ns() - before;
-        solve->spent_ns += took - (force_ns(&step) - forces);
-        if (step.adds_mass) step.body->safeguards.ns += took;
         pal_arena_reset(w->scratch);
     }
 }
@@ -311,14 +307,10 @@ static void run_stage(pal_world *w, pal_stage stage, double dt_s)
         if (skips || (output && step.body->asleep && !step.body->stale)) continue;
         int n_run = 0;
         for (int i = 0; i < w->plan.n_of[stage][b]; i++) {
-            pal_component *component = &w->plan.component[w->plan.first[stage][b] + i];
             /* a frozen body is shown where it stopped, if that is finite; its guard may restore it */
             if (step.body->frozen && stage == PAL_STAGE_ADAPT) continue;
             if (step.body->frozen && stage == PAL_STAGE_OUTPUT && !pal_body_finite(step.body)) continue;
-            uint64_t before = pal_clock_ns();
-            component->n_run++;
-            if (fails(w, step.body, component, component->effect->run(component->self, &step))) break;
-            component->spent_ns += pal_clock_ns() - before;
+            if (!run_component(w, &w->plan.component[w->plan.first[stage][b] + i], &step)) break;
             n_run++;
         }
         pal_arena_reset(w->scratch);

@@ -66,8 +66,8 @@ bool pal_world_has_field(const pal_world *world, int body, pal_field field); /* 
  * number, nothing within reach; MEMORY; both change nothing. Call between steps; allocates heap memory. [sim] */
 pal_err pal_world_brush(pal_world *world, int body, int slot, const pal_brush *brush, pal_diagnostic *diag);
 /* Sets a load on the nodes of a body, N, body axes [n_node][3], that compensates a change between two steps
- * (blend_component.h). It replaces one that still acts; a reset ends it. REFUSED: no such body; MEMORY. Call between
- * steps; allocates heap memory. [sim] */
+ * (inserted_components.h). It replaces one that still acts; a reset ends it. REFUSED: no such body; MEMORY. Call
+ * between steps; allocates heap memory. [sim] */
 pal_err pal_world_blend_force(pal_world *world, int body, const double *force_N);
 /* Sets the offset from where a body's nodes place its surface to where it is shown now, m, body frame [n_shown][3]. It
  * is released together with the load of pal_world_blend_force. Updates the shown surface at once. Errors as there.

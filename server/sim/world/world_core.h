@@ -2,9 +2,7 @@
 #ifndef PAL_SIM_WORLD_WORLD_CORE_H
 #define PAL_SIM_WORLD_WORLD_CORE_H
 #include "server/sim/plan/plan.h"
-#include "server/sim/world/blend_component.h"
-#include "server/sim/world/brush_components.h"
-#include "server/sim/world/field_components.h"
+#include "server/sim/world/inserted_components.h"
 #include "server/sim/world/shown_surface.h"
 
 typedef struct pal_world {
@@ -22,8 +20,7 @@ typedef struct pal_world {
     uint64_t tick, step_ns, end_ns;
     pal_err component_err;       /* of the first component that failed in this step */
     pal_field_components fields; /* inserted at run time */
-    pal_brush_components brushes;
-    pal_blend_components blends;
+    pal_inserted brushes, blends;
 } pal_world;
 
 /* what the components of body b may access, without times */

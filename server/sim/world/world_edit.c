@@ -88,8 +88,7 @@ static pal_err apply_material(pal_world *w, int b, const pal_material *to, pal_d
 
 pal_err pal_world_material(pal_world *world, int body, const pal_material *material, pal_diagnostic *diag)
 {
-    if (body < 0 || body >= world->plan.n_body)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body %d does not exist", body);
+    if (body < 0 || body >= world->plan.n_body) return PAL_REFUSE(diag, "body %d does not exist", body);
     pal_material to = *material, was = world->material[body];
     PAL_TRY(pal_material_check(&to, diag));
     world->plan.body[body].asleep = false;

@@ -46,8 +46,6 @@ static void copy_part(const pal_body *body, pal_frame_part *to)
     to->frozen = body->frozen;
     memcpy(to->reason, body->reason, sizeof to->reason);
     to->safeguards = body->safeguards;
-    to->n_safeguard = pal_safeguards_sum(&body->safeguards);
-    to->safeguard_ns = body->safeguards.ns;
     to->asleep = body->asleep;
     bool same = to->n_output == body->display.n_output; /* the frame has these positions already */
     to->n_output = body->display.n_output;

@@ -106,9 +106,7 @@ pal_err pal_zz_estimator_estimate(const pal_world *world, int body, double *shar
         if (info.body == at->name && component->effect->inspect.stress) found = component;
     }
     *out = (pal_zz_estimator_error){.error = NAN, .solution = NAN, .percent = NAN};
-    if (!found)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": none of its rows gives stress in elements",
-                                  at->name);
+    if (!found) return PAL_REFUSE(diag, "body \"%s\": none of its rows gives stress in elements", at->name);
     recovery r = {.share = share_J};
     r.sum = malloc(9 * sizeof *r.sum * (size_t)at->n_node);
     r.volume = malloc(sizeof *r.volume * (size_t)at->n_node);

@@ -56,7 +56,7 @@ static bool settle_tapped(void *self, pal_step *step, const double *moved, bool 
     if (!spring) abort();
     for (int i = 0; i < step->n_contact; i++) {
         const pal_component *row = &step->contact[i];
-        if (row->effect->tangent) row->effect->tangent->multiply(row->self, body, 1, 0, moved, spring);
+        if (row->effect->tangent) row->effect->tangent->multiply(row->self, body, 1, moved, spring);
     }
     tap.node_share = take_forces(body, spring);
     free(spring);

@@ -61,7 +61,7 @@ static bool open_springs(spring_scene *t, bool skinned)
     for (int i = 0; i < n && t->n < MAX_CONTACTS; i++) {
         pal_contact *c = &t->contact[t->n];
         c->point = list[i];
-        pal_contact_points_position(&t->points, list[i], t->x[t->n]);
+        pal_contact_points_at(&t->points, list[i], t->points.x, t->x[t->n]);
         pal_sub3(c->away, t->x[t->n], t->centre);
         c->depth_m = 0.02 - pal_norm3(c->away);
         c->k_N_m = 10 + i;
@@ -92,7 +92,7 @@ static void measures_what_points_do(void)
                 for (int i = 0; i < 3 * body->n_node; i++) body->x[i] += (side ? -2 : 1) * step * u[i];
                 pal_contact_points_update(&t.points, body, 1);
                 for (int i = 0; i < t.n; i++) {
-                    pal_contact_points_position(&t.points, t.contact[i].point, x);
+                    pal_contact_points_at(&t.points, t.contact[i].point, t.points.x, x);
                     pal_sub3(x, x, t.x[i]);
                     motion[i] = (side ? -0.5 : 0.5) * pal_dot3(x, t.contact[i].away) / step + (side ? motion[i] : 0);
                 }

@@ -109,7 +109,7 @@ static void a_proxys_side_turns_as_far_at_every_step_length(void)
         printf("  %4d Hz: turned by %.3f degrees\n", rate_hz[k], angle[k]);
         CHECK_NEAR(angle[k], angle[0], 1);
     }
-    CHECK_NEAR(angle[RATES - 1], 60 * (1 - exp(-0.1 / SIDE_S)), 5);
+    CHECK_NEAR(angle[RATES - 1], 60 * (1 - exp(-0.1 / FOLLOW_S)), 5);
 }
 
 int main(void)

@@ -242,7 +242,7 @@ static void a_handle_is_a_spring_of_its_stiffness(void)
         size_t n = (size_t)s.body->n_node;
         double *p = calloc(3 * n, sizeof *p), *q = calloc(3 * n, sizeof *q), *bound = calloc(n, sizeof *bound), sum = 0;
         for (size_t i = 0; i < n; i++) p[3 * i + 1] = 1;
-        row->effect->tangent->multiply(row->self, s.body, 1, 0, p, q);
+        row->effect->tangent->multiply(row->self, s.body, 1, p, q);
         row->effect->bounds.stiffness(row->self, s.body, bound);
         for (size_t i = 0; i < n; i++) {
             sum += q[3 * i + 1];

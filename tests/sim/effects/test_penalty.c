@@ -39,7 +39,7 @@ static void force_is_the_gradient_of_the_energy_and_the_tangent_its_slope(void)
     memset(body->f, 0, n3 * sizeof *body->f);
     pal_step step = {.body = body};
     CHECK_INT(row->effect->run(row->self, &step), 0);
-    row->effect->tangent->multiply(row->self, body, 1, 0, p, kp);
+    row->effect->tangent->multiply(row->self, body, 1, p, kp);
     for (size_t i = 0; i < n3; i++) sum -= body->f[i] * p[i], slope += kp[i] * p[i];
     const double h = 1e-4, at = row->effect->energy(row->self, body);
     for (size_t i = 0; i < n3; i++) body->d[i] += h * p[i];

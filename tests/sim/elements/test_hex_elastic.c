@@ -44,7 +44,7 @@ static void product_is_that_of_the_integrated_stiffness(void)
             double *want = hex_zeros(n), k[576];
             for (int i = 0; i < n; i++) p[i] = hex_random(&seed), want[i] = out[i] = hex_random(&seed);
             hex_effect->tangent->linearise(b.row, &b.body);
-            hex_effect->tangent->multiply(b.row, &b.body, 0.7, 0, p, out);
+            hex_effect->tangent->multiply(b.row, &b.body, 0.7, p, out);
             for (int e = 0; e < b.hexes.n_hex; e++) {
                 dense(bbar, 5000, b.def->material.poisson, 0.01, fmax(0.02, (double)b.hexes.fill[e]), k);
                 const int32_t *node = b.hexes.node + 8 * e;
@@ -122,7 +122,7 @@ static void rotated_tangent_is_that_of_one_voxel_at_a_time(void)
     uint64_t seed = 4;
     for (int i = 0; i < 36; i++) p[i] = hex_random(&seed);
     hex_effect->tangent->linearise(b.row, &b.body);
-    hex_effect->tangent->multiply(b.row, &b.body, 1, 0, p, got);
+    hex_effect->tangent->multiply(b.row, &b.body, 1, p, got);
     dense(1, 5000, 0.45, 0.01, 1, k);
     for (int e = 0; e < 2; e++) {
         const int32_t *node = b.hexes.node + 8 * e;
@@ -188,10 +188,10 @@ static void product_and_assembled_matrix_agree(void)
             uint64_t seed = 9;
             for (int i = 0; i < n; i++) p[i] = hex_random(&seed);
             hex_effect->tangent->linearise(b.row, &b.body);
-            hex_effect->tangent->multiply(b.row, &b.body, 3, 0, p, one);
+            hex_effect->tangent->multiply(b.row, &b.body, 3, p, one);
             pal_block_matrix_zero(&a);
-            hex_effect->tangent->assemble(b.row, &b.body, 1, 0, &a);
-            hex_effect->tangent->assemble(b.row, &b.body, 2, 0, &a);
+            hex_effect->tangent->assemble(b.row, 1, &a);
+            hex_effect->tangent->assemble(b.row, 2, &a);
             pal_block_matrix_multiply(&a, 1, p, two);
             CHECK_LE(hex_farthest(one, two, n), 1e-12 * hex_largest(one, n));
             free(p), free(one), free(two);
@@ -220,13 +220,13 @@ static void tangent_is_symmetric_and_semi_definite(void)
                     /* towards the least eigenvalue as well */
                     for (int s = 0; s < 20 && t < 5; s++) {
                         memset(kp, 0, sizeof *kp * (size_t)n);
-                        hex_effect->tangent->multiply(b.row, &b.body, 1, 0, p, kp);
+                        hex_effect->tangent->multiply(b.row, &b.body, 1, p, kp);
                         double max = hex_largest(kp, n) / hex_largest(p, n);
                         for (int i = 0; i < n; i++) p[i] -= kp[i] / (3 * max + 1e-300);
                     }
                     memset(kp, 0, sizeof *kp * (size_t)n);
-                    hex_effect->tangent->multiply(b.row, &b.body, 1, 0, p, kp);
-                    hex_effect->tangent->multiply(b.row, &b.body, 1, 0, q, kq);
+                    hex_effect->tangent->multiply(b.row, &b.body, 1, p, kp);
+                    hex_effect->tangent->multiply(b.row, &b.body, 1, q, kq);
                     for (int i = 0; i < n; i++) {
                         pkp += p[i] * kp[i], pkq += p[i] * kq[i], qkp += q[i] * kp[i];
                         size += fabs(p[i] * kq[i]) + fabs(q[i] * kp[i]);
@@ -256,7 +256,7 @@ static void neo_hookean_tangent_is_the_derivative_of_the_force(void)
         uint64_t seed = 2;
         for (int i = 0; i < n; i++) p[i] = hex_random(&seed), x[i] = b.body.x[i];
         hex_effect->tangent->linearise(b.row, &b.body);
-        hex_effect->tangent->multiply(b.row, &b.body, 1, 0, p, kp);
+        hex_effect->tangent->multiply(b.row, &b.body, 1, p, kp);
         for (int s = -1; s <= 1; s += 2) {
             for (int i = 0; i < n; i++) b.body.x[i] = x[i] + s * 1e-8 * p[i];
             const double *f = hex_force(&b);
@@ -317,7 +317,7 @@ static void neo_hookean_tangent_is_that_of_one_point_at_a_time(void)
             hex_shake(&b, noise[state], 60);
             for (int i = 0; i < n; i++) p[i] = hex_random(&seed);
             hex_effect->tangent->linearise(b.row, &b.body);
-            hex_effect->tangent->multiply(b.row, &b.body, 1, 0, p, got);
+            hex_effect->tangent->multiply(b.row, &b.body, 1, p, got);
             for (int e = 0; e < b.hexes.n_hex; e++) plain_neo_product(&b, !element, b.hexes.node + 8 * e, p, want);
             CHECK_LE(hex_farthest(got, want, n), 1e-10 * hex_largest(want, n));
             free(p), free(got), free(want);
@@ -341,7 +341,7 @@ static void neo_hookean_at_rest_is_the_linear_element(void)
             for (int i = 0; i < n; i++) p[i] = hex_random(&seed);
             kp[law] = hex_zeros(n);
             hex_effect->tangent->linearise(b[law].row, &b[law].body);
-            hex_effect->tangent->multiply(b[law].row, &b[law].body, 1, 0, p, kp[law]);
+            hex_effect->tangent->multiply(b[law].row, &b[law].body, 1, p, kp[law]);
         }
         CHECK_LE(hex_farthest(kp[0], kp[1], n), 1e-9 * hex_largest(kp[0], n));
         free(p), free(kp[0]), free(kp[1]);
@@ -620,7 +620,7 @@ static void bounds_are_close_to_the_largest_eigenvalue(void)
             hex_effect->tangent->linearise(b.row, &b.body);
             for (int t = 0; t < 300; t++) {
                 memset(q, 0, sizeof *q * (size_t)n);
-                hex_effect->tangent->multiply(b.row, &b.body, 1, 0, p, q);
+                hex_effect->tangent->multiply(b.row, &b.body, 1, p, q);
                 value = hex_largest(q, n);
                 for (int i = 0; i < n; i++) p[i] = q[i] / value;
             }

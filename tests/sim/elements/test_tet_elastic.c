@@ -118,11 +118,11 @@ static void multiply_is_the_assembled_matrix(void)
         REQUIRE(t->couple(b.row.self, &cliques));
         REQUIRE(pal_block_matrix_make(b.n, &cliques, 1, b.arena, &k) == 0);
         t->linearise(b.row.self, &b.body);
-        t->assemble(b.row.self, &b.body, 2, 0, &k);
+        t->assemble(b.row.self, 2, &k);
         size_t n = 3 * (size_t)b.n;
         double *p = malloc(n * sizeof *p), *one = calloc(n, sizeof *one), *two = calloc(n, sizeof *two), pkp = 0;
         for (size_t i = 0; i < n; i++) p[i] = uniform();
-        t->multiply(b.row.self, &b.body, 2, 0, p, one);
+        t->multiply(b.row.self, &b.body, 2, p, one);
         pal_block_matrix_multiply(&k, 1, p, two);
         double max = elastic_max(two, (int)n);
         CHECK(max > 0);
@@ -139,7 +139,7 @@ static void multiply_is_the_assembled_matrix(void)
 static void multiply_rows(elastic_bench *b, const double *p, double *out)
 {
     memset(out, 0, 3 * sizeof *out * (size_t)b->n);
-    b->row.effect->tangent->multiply(b->row.self, &b->body, 1, 0, p, out);
+    b->row.effect->tangent->multiply(b->row.self, &b->body, 1, p, out);
 }
 
 /* -df/dx along p by differences */
@@ -212,7 +212,7 @@ static void corotational_tangent_is_the_turned_one(void)
         }
         /* rotations around nodes: all R */
         double *turn = calloc(9 * (size_t)b.n, sizeof *turn);
-        b.row.effect->tangent->rotate(b.row.self, &b.body, turn);
+        b.row.effect->tangent->rotate(b.row.self, turn);
         for (int i = 0; i < b.n; i++) {
             double length = 0;
             for (int k = 0; k < 9; k++) length += turn[9 * i + k] * turn[9 * i + k] / 3;

@@ -129,7 +129,7 @@ static void force_without_the_turning_of_the_frame_would_not_be(void)
     double fixed[24] = {0}, u[24];
     cell_effect->tangent->linearise(b.row, &b.body);
     double turn[24 * 3] = {0};
-    cell_effect->tangent->rotate(b.row, &b.body, turn);
+    cell_effect->tangent->rotate(b.row, turn);
     /* R K (R'x - X) = R K R'(x - R X) */
     double r[9];
     memcpy(r, turn, sizeof r);
@@ -137,7 +137,7 @@ static void force_without_the_turning_of_the_frame_would_not_be(void)
     for (int i = 0; i < 9; i++) r[i] *= scale;
     for (int i = 0; i < 8; i++)
         for (int c = 0; c < 3; c++) u[3 * i + c] = b.body.d[3 * i + c] - pal_dot3(r + 3 * c, b.body.node_rest + 3 * i);
-    cell_effect->tangent->multiply(b.row, &b.body, -1, 0, u, fixed);
+    cell_effect->tangent->multiply(b.row, &b.body, -1, u, fixed);
     const double *f = cell_force(&b);
     double torque[2][3] = {{0}}, apart = 0;
     for (int i = 0; i < 8; i++)
@@ -310,7 +310,7 @@ static void young_that_varies_inside_an_element_is_integrated_exactly(void)
             }
             memset(out, 0, 3 * sizeof *out * (size_t)n);
             cell_effect->tangent->linearise(b.row, &b.body);
-            cell_effect->tangent->multiply(b.row, &b.body, 1, 0, p, out);
+            cell_effect->tangent->multiply(b.row, &b.body, 1, p, out);
             /* int (1000 + 500 y) ((y + c)^2 + x^2/2), c = 0 or 1 */
             double wanted = 1000 * (1.0 / 12 + 1.0 / 24) + (power == 2 ? 1000 + 500 * 2.0 / 12 : 0);
             /* of a hexahedron volume counts by its mean: int kappa t^2 less (int kappa t)^2 / int kappa, kappa = E / 3,
@@ -442,8 +442,8 @@ static void products_are_those_of_the_tangent_with_fixed_rotations(void)
             p[k] = 2 * pal_random_unit(1, (uint64_t)k) - 1;
             q[k] = 2 * pal_random_unit(2, (uint64_t)k) - 1;
         }
-        cell_effect->tangent->multiply(b.row, &b.body, 2, 5, p, kp);
-        cell_effect->tangent->multiply(b.row, &b.body, 2, 5, q, kq);
+        cell_effect->tangent->multiply(b.row, &b.body, 2, p, kp);
+        cell_effect->tangent->multiply(b.row, &b.body, 2, q, kq);
         CHECK_NEAR(cell_dot(p, kq, n) / cell_dot(q, kp, n), 1, 1e-10);
         CHECK(cell_dot(p, kp, n) > 0);
         /* where nothing is strained, holding the rotations changes nothing */
@@ -454,7 +454,7 @@ static void products_are_those_of_the_tangent_with_fixed_rotations(void)
         for (int k = 0; k < n; k++) apart = fmax(apart, fabs(-2 * f[k] / h - kp[k]));
         CHECK_LE(apart, 1e-3 * cell_largest(kp, n));
         /* rotations at nodes: of the body, weighing mu V together */
-        cell_effect->tangent->rotate(b.row, &b.body, turn);
+        cell_effect->tangent->rotate(b.row, turn);
         const pal_material *m = &b.def->material;
         double sum[9] = {0}, shear_J = pal_subdivision_solid_volume_m3(b.solid) * m->young_Pa / (2 * (1 + m->poisson));
         for (int k = 0; k < 3 * n; k++) sum[k % 9] += turn[k];

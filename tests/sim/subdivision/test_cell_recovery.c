@@ -115,12 +115,12 @@ static void the_tangent_of_regions_is_symmetric_and_semi_definite(void)
         cell_effect->tangent->linearise(b.row, &b.body);
         for (int k = 0; k < n; k++)
             p[k] = pal_random_unit(7, (uint64_t)k) - 0.5, q[k] = pal_random_unit(8, (uint64_t)k) - 0.5;
-        cell_effect->tangent->multiply(b.row, &b.body, 1, 0, p, kp);
-        cell_effect->tangent->multiply(b.row, &b.body, 1, 0, q, kq);
+        cell_effect->tangent->multiply(b.row, &b.body, 1, p, kp);
+        cell_effect->tangent->multiply(b.row, &b.body, 1, q, kq);
         CHECK_NEAR(cell_dot(p, kq, n) / cell_dot(p, kp, n), cell_dot(q, kp, n) / cell_dot(p, kp, n), 1e-6);
         CHECK(cell_dot(p, kp, n) > 0 && cell_dot(q, kq, n) > 0);
         for (int k = 0; k < n; k++) p[k] = 1, kq[k] = 0;
-        cell_effect->tangent->multiply(b.row, &b.body, 1, 0, p, kq);
+        cell_effect->tangent->multiply(b.row, &b.body, 1, p, kq);
         CHECK_LE(cell_largest(kq, n), 1e-9 * cell_largest(kp, n));
         free(p);
         cell_free(&b);
@@ -214,7 +214,7 @@ static void elements_in_regions_cost_nothing(void)
         }
         CHECK(!memcmp(f, cell_force(&b), sizeof *f * n));
         CHECK(cell_energy(&b) == energy_J);
-        cell_effect->tangent->multiply(b.row, &b.body, 1, 0, p, kp);
+        cell_effect->tangent->multiply(b.row, &b.body, 1, p, kp);
         CHECK(isfinite(cell_dot(kp, kp, (int)n)) && cell_dot(p, kp, (int)n) > 0);
         (void)look(&b);
         CHECK(isnan(b.row->recovery.of[0].element_J));

@@ -94,8 +94,8 @@ static void the_tangent_is_that_of_the_forces(void)
         cell_effect->tangent->linearise(b.row, &b.body);
         for (int k = 0; k < n; k++)
             p[k] = pal_random_unit(7, (uint64_t)k) - 0.5, q[k] = pal_random_unit(8, (uint64_t)k) - 0.5;
-        cell_effect->tangent->multiply(b.row, &b.body, 1, 0, p, kp);
-        cell_effect->tangent->multiply(b.row, &b.body, 1, 0, q, kq);
+        cell_effect->tangent->multiply(b.row, &b.body, 1, p, kp);
+        cell_effect->tangent->multiply(b.row, &b.body, 1, q, kq);
         CHECK_NEAR(cell_dot(p, kq, n) / cell_dot(p, kp, n), cell_dot(q, kp, n) / cell_dot(p, kp, n), 1e-6);
         for (int k = 0; k < n; k++) b.body.d[k] = b.body.node_rest[k] + 1e-6 * p[k];
         const double *f = cell_force(&b);

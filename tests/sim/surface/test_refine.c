@@ -607,6 +607,33 @@ static void a_change_of_level_conserves_energy_mass_and_momentum(void)
     }
 }
 
+/* a body without loads that has been evaluated twice may sleep; does it after 0.19 s at a speed that moves it by `part`
+ * of an edge, before it is due again? */
+static bool stays_settled(double part)
+{
+    shell_scene s;
+    take_sphere(&s);
+    thresholds(&s, 0.02, 0, 0);
+    if (!shell_scene_start(&s)) return false;
+    const pal_component *row = pal_world_component(s.world, pal_world_find_component(s.world, 0, "refine"));
+    const double edge_m = pal_adaptive_mean_edge_m(&s.body->model.adaptive->levels, 0), dt_s = 0.01;
+    pal_step step = {.body = s.body, .dt_s = dt_s, .n_sub = 1};
+    for (int i = 0; i < 100 && row->effect->sleep.settled_s(row->self) > 0; i++) row->effect->run(row->self, &step);
+    CHECK(row->effect->sleep.settled_s(row->self) == 0);
+    for (int k = 0; k < s.body->n_active; k++)
+        pal_set3(s.body->v + 3 * pal_body_point(s.body, k), part * edge_m / 0.19, 0, 0);
+    for (int i = 0; i < 19; i++) row->effect->run(row->self, &step);
+    const bool settled = row->effect->sleep.settled_s(row->self) == 0;
+    shell_scene_close(&s);
+    return settled;
+}
+
+static void a_body_that_moved_is_evaluated_again(void)
+{
+    CHECK(stays_settled(0.5e-4));
+    CHECK(!stays_settled(2e-4));
+}
+
 static void bad_numbers_are_refused_in_a_sentence(void)
 {
     static const struct {
@@ -650,6 +677,7 @@ int main(void)
     RUN(a_moving_body_is_refined_like_one_at_rest);
     RUN(a_change_of_level_conserves_energy_mass_and_momentum);
     RUN(a_change_of_level_under_a_wave_conserves_them_too);
+    RUN(a_body_that_moved_is_evaluated_again);
     RUN(bad_numbers_are_refused_in_a_sentence);
     return check_report();
 }
