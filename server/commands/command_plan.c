@@ -64,7 +64,7 @@ static const struct {
                 {"edge_spring", "model \"adaptive_springs\""},
                 {"shape_spring", "model \"adaptive_springs\" with k_shape_N_m not 0"},
                 {"refine", "model \"adaptive_springs\" with more than one level"},
-                {"viscous", "material.damping_1_s above 0"}};
+                {"viscous", "material.damping_1_s not 0"}};
 
 /* "an entry \"gravity\" in effects"; returns text */
 static const char *effect_words(const char *name, char text[128])
@@ -269,7 +269,7 @@ int command_plan(int argc, char **argv)
     pal_preflight preflight = {0};
     if (!err) {
         err = pal_world_create(scene, &reason, &world);
-        if (!err) err = pal_preflight_run(scene, PAL_PREFLIGHT_FULL, &preflight, &reason);
+        if (!err) err = pal_preflight_run(scene, &preflight, &reason);
         if (err) pal_diagnostic_set(&diag, err, "%s: %s", word[0], reason.text);
     }
     pal_report_progress("measure", 0, &common);

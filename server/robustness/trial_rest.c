@@ -28,7 +28,7 @@ double pal_trial_return_time_s(const pal_trial *trial)
 {
     double max = 0;
     pal_preflight *preflight = malloc(sizeof *preflight);
-    if (preflight && !pal_preflight_run(trial->scene, PAL_PREFLIGHT_FULL, preflight, NULL))
+    if (preflight && !pal_preflight_run(trial->scene, preflight, NULL))
         for (int b = 0; b < preflight->n_body; b++)
             max = fmax(max, preflight->body[b].slowest_period_s); /* fmax ignores NaN */
     free(preflight);

@@ -121,7 +121,8 @@ static uint64_t mix_item(uint64_t h, const pal_config_entry *item)
 static uint64_t mix_material(uint64_t h, const pal_material *m)
 {
     double number[4] = {m->young_Pa, m->poisson, m->density_kg_m3, m->damping_1_s};
-    return pal_hash_bytes(h, number, sizeof number);
+    h = pal_hash_bytes(h, number, sizeof number);
+    return m->damping_1_s == PAL_DAMPING_DERIVED ? pal_hash_bytes(h, &m->damping_ratio, sizeof(double)) : h;
 }
 static uint64_t mix_mesh(uint64_t h, const pal_prepared *mesh)
 {

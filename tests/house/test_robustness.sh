@@ -115,7 +115,7 @@ check "it says so" has out "give more --seconds"
 end
 
 begin "a scene that does not rest is reported, and a case that needs rest is undecided"
-altered springs ringing 's/"damping_1_s":[[:space:]]*[0-9.]*/"damping_1_s": 0/' '"damping_1_s": 0'
+altered springs ringing 's/"damping_ratio":[[:space:]]*[0-9.]*/"damping_1_s": 0/' '"damping_1_s": 0'
 altered ringing swinging 's/"effects":[[:space:]]*\[/&{"name": "gravity"}, /' '{"name": "gravity"}'
 gives 1 swinging --only poisoned --seconds 4 --json
 check "not ok" has out '"ok":false'

@@ -137,8 +137,9 @@ typedef struct pal_body {
     double stiffening_damping_1_s, stiffening_damping_s; /* extra drag and its remaining time (stiffening_damper.h)   */
 
     /* ---- motion near rest ---- */
-    double lowest_1_s;  /* lowest angular frequency of the supported body at rest, 1/s; 0: not known              */
-    double damping_1_s; /* drag over mass that acts, 1/s                                                          */
+    double lowest_1_s;   /* lowest angular frequency of the supported body at rest, 1/s; 0: not known              */
+    double lowest_error; /* relative, of lowest_1_s, by which it may be too high                                  */
+    double damping_1_s;  /* drag over mass that acts, 1/s                                                          */
 
     /* ---- state and safeguards ---- */
     bool frozen;                  /* stopped (pal_body_stop): it no longer moves                                    */

@@ -21,6 +21,11 @@
 #define PAL_POISSON_MAX    (0.5 - 0.01 * PAL_POISSON_MARGIN)
 /* 1/s, c/m: faster decay than the shortest sub-step resolves */
 #define PAL_DAMPING_MAX_1_S 1e9
+/* 1/s: the largest rate that is derived from the lowest frequency. Soft tissue comes to rest within a second with it;
+ * bodies with w1 above 2 1/s have it (tests/sim/plan/test_damping.c) */
+#define PAL_DAMPING_1_S 4.0
+/* largest damping ratio of mode 1: the cap holds long before (tests/scene/test_material_limits.c) */
+#define PAL_DAMPING_RATIO_MAX 1e3
 
 /* ---- sizes ---- */
 
