@@ -204,7 +204,7 @@ static activity measure_activity(const pal_trial *trial)
 static bool settle_loaded(pal_trial *trial, double *ms)
 {
     const double step = pal_trial_long_step_s(trial), begin = trial->out->simulated_s,
-                 max_s = fmax(PAL_RETURN_TIME_S, PAL_SETTLE_TAU * trial->tau_s);
+                 max_s = fmax(PAL_RETURN_TIME_S, PAL_SETTLE_TAU * fmax(trial->tau_s, step));
     int n = (int)ceil(PAL_REST_HOLD_S / step), all = 0;
     double before = pal_trial_cpu_s(), late = before + 0.5 * (trial->deadline_s - before);
     for (;;) {

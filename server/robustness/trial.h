@@ -51,7 +51,7 @@ bool pal_trial_run(pal_trial *trial, double seconds); /* steps of the scene */
 void pal_trial_return(pal_trial *trial, double seconds);
 /* trial_rest.c */
 void pal_trial_find_times(pal_trial *trial); /* sets lowest_1_s and tau_s, in the rest state */
-/* a step with which bodies that creep come to rest soon: up to tau_s where all solvers are implicit, else the scene's
+/* a step with which bodies that creep come to rest soon: some tau_s where all solvers are implicit, else the scene's
  */
 double pal_trial_long_step_s(const pal_trial *trial);
 double pal_trial_speed_S_s(const pal_trial *trial);       /* largest RMS speed of a body over its S */

@@ -38,12 +38,12 @@ double pal_trial_long_step_s(const pal_trial *trial)
 {
     for (int b = 0; b < trial->scene->n_body; b++)
         if (!pal_world_body(trial->world, b)->implicit) return trial->scene->step_s;
-    return fmin(PAL_RETURN_TIME_S, fmax(trial->tau_s, trial->scene->step_s));
+    return fmin(PAL_RETURN_TIME_S, fmax(PAL_LONG_STEP_TAU * trial->tau_s, trial->scene->step_s));
 }
 
 bool pal_trial_settle(pal_trial *trial, double *took_s)
 {
-    const double max_s = fmax(3 * PAL_RETURN_TIME_S, PAL_SETTLE_TAU * trial->tau_s),
+    const double max_s = fmax(3 * PAL_RETURN_TIME_S, PAL_SETTLE_TAU * fmax(trial->tau_s, pal_trial_long_step_s(trial))),
                  still_S_s = fmin(PAL_REST_SPEED_S_S, 0.1 * PAL_RETURN_S / fmax(trial->tau_s, 1e-9));
     double rest_time_s = 0, t = 0;
     /* what falls into its weight swings first */

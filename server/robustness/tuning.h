@@ -24,8 +24,10 @@
 #define PAL_TREND_TAU_SHARE 0.15
 #define PAL_TREND_FALL      0.05
 #define PAL_TREND_SAVES     1.25
-/* time constants after which a displacement of 0.01 S is within 1e-7 S, a tenth of the drift allowed in an hour */
-#define PAL_SETTLE_TAU 12
+/* time constants after which a displacement of 0.01 S is within 1e-7 S, a tenth of the drift allowed in an hour; as
+ * many implicit steps, where they are longer: a step of four time constants leaves a fifth */
+#define PAL_SETTLE_TAU    12
+#define PAL_LONG_STEP_TAU 4
 /* energy rise over the input, as a share: rounding and contact corrections; solvers whose velocities lag (robustness.h)
  */
 #define PAL_ENERGY_SLACK         0.01
