@@ -356,6 +356,11 @@ int pal_preflight_describe(const pal_preflight_body *b, char line[PAL_PREFLIGHT_
     else if (isfinite(b->omega_max_1_s) && b->n_fixed == 0)
         snprintf(line[n++], PAL_PREFLIGHT_LINE, "no support holds it; its fastest motion takes %.3g ms",
                  2e3 * M_PI / b->omega_max_1_s);
+    else if (isfinite(b->omega_max_1_s) && b->n_fixed > 0)
+        snprintf(
+            line[n++], PAL_PREFLIGHT_LINE,
+            "its slowest motion is not known: part of it is not held, or it is too large; its fastest takes %.3g ms",
+            2e3 * M_PI / b->omega_max_1_s);
     if (b->slow[0]) snprintf(line[n++], PAL_PREFLIGHT_LINE, "%s", b->slow);
     return n;
 }

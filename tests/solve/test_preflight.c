@@ -181,6 +181,34 @@ static void what_nothing_holds_has_no_slowest_motion(void)
     beam_free(&b);
 }
 
+/* two boxes of which one floats: its slowest motion takes for ever, which is no number */
+static void a_loose_part_is_told(void)
+{
+    fem_beam b;
+    pal_preflight p;
+    char line[PAL_PREFLIGHT_LINES][PAL_PREFLIGHT_LINE];
+    bool reported = false;
+    beam_make(&b, 4, 2, 2, 0.01, true);
+    beam_element(&b, "tet4", "corotational");
+    /* the tetrahedra of the second voxel along x are taken out, all four across */
+    pal_tets *tets = &b.mesh.tets;
+    int n = 0;
+    for (int e = 0; e < tets->n_tet; e++) {
+        double middle = 0;
+        for (int c = 0; c < 4; c++) middle += 0.25 * tets->x[3 * tets->tet[4 * e + c]];
+        if (middle > 0.01 && middle < 0.02) continue;
+        memmove(tets->tet + 4 * n++, tets->tet + 4 * e, 4 * sizeof *tets->tet);
+    }
+    CHECK_INT(n, tets->n_tet * 3 / 4);
+    tets->n_tet = n;
+    REQUIRE(!pal_preflight_run(b.scene, &p, &diag));
+    CHECK(isnan(p.body[0].omega_min_1_s) && isnan(p.body[0].return_s));
+    for (int k = pal_preflight_describe(&p.body[0], line) - 1; k >= 0; k--)
+        reported |= strstr(line[k], "slowest motion is not known") != NULL;
+    CHECK(reported);
+    beam_free(&b);
+}
+
 static void what_cannot_run_is_refused_with_the_node_that_is_to_blame(void)
 {
     pal_prepared box;
@@ -203,6 +231,7 @@ int main(void)
     RUN(components_of_every_kind_are_in_the_predicted_cost);
     RUN(a_slow_return_is_told);
     RUN(what_nothing_holds_has_no_slowest_motion);
+    RUN(a_loose_part_is_told);
     RUN(what_cannot_run_is_refused_with_the_node_that_is_to_blame);
     return check_report();
 }
