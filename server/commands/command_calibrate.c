@@ -206,7 +206,8 @@ static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_diagn
     run->settle_s = pal_clock_s() - begin;
     free(u);
     if (run->settled) scene->scene.body[0].material.damping_1_s = run->live.damping_1_s;
-    run->damping_1_s = scene->scene.body[0].material.damping_1_s;
+    /* unsettled, it is derived when the scene is served */
+    run->damping_1_s = run->settled ? run->live.damping_1_s : (double)NAN;
     return err == PAL_ERR_STATE ? PAL_ERR_OK : err; /* stopped: the scene keeps its own damping */
 }
 

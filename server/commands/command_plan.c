@@ -64,7 +64,7 @@ static const struct {
                 {"edge_spring", "model \"adaptive_springs\""},
                 {"shape_spring", "model \"adaptive_springs\" with k_shape_N_m not 0"},
                 {"refine", "model \"adaptive_springs\" with more than one level"},
-                {"viscous", "material.damping_1_s above 0"}};
+                {"viscous", "material.damping_1_s not 0"}};
 
 /* "an entry \"gravity\" in effects"; returns text */
 static const char *effect_words(const char *name, char text[128])
@@ -248,7 +248,7 @@ int command_plan(int argc, char **argv)
     pal_preflight preflight = {0};
     if (!err) {
         err = pal_world_create(scene, &diag, &world);
-        if (!err) err = pal_preflight_run(scene, PAL_PREFLIGHT_FULL, &preflight, &diag);
+        if (!err) err = pal_preflight_run(scene, &preflight, &diag);
         pal_diagnostic_prefix(&diag, err, word[0]);
     }
     pal_report_progress("measure", 0, &common);

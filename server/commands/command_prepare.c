@@ -10,6 +10,7 @@
 #include "server/mesh/scan/label_volume.h"
 #include "server/scene/scene_file.h"
 #include "server/sim/world/world.h"
+#include "server/solve/preflight.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -55,6 +56,7 @@ typedef struct outcome {
         fine_substep; /* of a step at rest; with a face of the finest level, as each level halves the bound */
     int max_node;     /* limit of the component refine; 0: none is needed                                  */
     double busy;      /* predicted share of real time with as many nodes as the limit allows               */
+    char slow[PAL_PREFLIGHT_LINE]; /* the body returns slowly; "": it does not, or its world takes long */
     char file[FILES][80];
     int n_file;
 } outcome;
@@ -206,7 +208,8 @@ static cJSON *as_json(const pal_loaded_scene *loaded, const arguments *args, con
                               {"split", JSON_NUMBER(r->prepare.split_s)}, {"skin", JSON_NUMBER(r->prepare.skin_s)},
                               {"write", JSON_NUMBER(out->write_s)}, {"total", JSON_NUMBER(out->total_s)});
     return PAL_JSON_ADD(o, {"dropped", dropped}, {"mended", JSON_NUMBER(read->n_repaired)},
-                        {"welded", JSON_NUMBER(read->n_welded)}, {"seconds", seconds});
+                        {"welded", JSON_NUMBER(read->n_welded)}, {"slow", out->slow[0] ? JSON_TEXT(out->slow) : NULL},
+                        {"seconds", seconds});
 }
 
 /* in the unit that gives one to four digits before the decimal point; returns out */
@@ -286,6 +289,7 @@ static void print(const pal_loaded_scene *loaded, const arguments *args, const o
     if (n_component > 1) printf("the components are not connected, each has its own support (--largest keeps one)\n");
     pal_loose_components_describe(&loaded->loose[0], loaded->scene.body[0].name, &dropped);
     if (dropped.text[0]) printf("%s\n", dropped.text);
+    if (out->slow[0]) printf("%s\n", out->slow);
     if (d->n_degenerate + d->n_duplicate + d->n_nonfinite + d->n_folded > 0)
         printf("dropped triangles: %lld degenerate, %lld duplicate, %lld not finite, %lld folded\n",
                (long long)d->n_degenerate, (long long)d->n_duplicate, (long long)d->n_nonfinite,
@@ -322,6 +326,20 @@ static pal_err limit_nodes(pal_loaded_scene *loaded, const char *name, outcome *
     return pal_entry_put_number(refine, "most_node", out->max_node, diag);
 }
 
+/* what a user should know before serving: that the body returns slowly. Left out for a body whose world takes long */
+static pal_err find_return(const pal_loaded_scene *loaded, outcome *out)
+{
+    pal_world *world;
+    if (loaded->scene.body[0].mesh->tets.n_node > PAL_RETURN_NODES) return PAL_ERR_OK;
+    /* what serve would refuse is refused there */
+    if (pal_world_create(&loaded->scene, NULL, &world)) return PAL_ERR_OK;
+    pal_err err = PAL_ERR_OK;
+    if (!(pal_world_body(world, 0)->lowest_1_s > 0)) err = pal_world_find_lowest(world, 0, NULL);
+    (void)pal_preflight_slow(pal_world_body(world, 0), out->slow);
+    pal_world_destroy(world);
+    return err;
+}
+
 static int run(pal_flag_common *common, const char *in, arguments *args)
 {
     pal_loaded_scene *loaded = NULL;
@@ -335,6 +353,7 @@ static int run(pal_flag_common *common, const char *in, arguments *args)
     if (err) return pal_report_refusal(common, err, &diag);
     err = pal_scene_rename(loaded, args->name, args->title, args->source, &diag);
     if (!err && args->scene.adaptive) err = limit_nodes(loaded, in ? in : "procedural", &out, &diag);
+    if (!err) err = find_return(loaded, &out);
     double before = pal_clock_s();
     pal_report_progress("write", 0, common);
     if (!err) err = save(loaded, args, &out, &diag);
@@ -381,7 +400,7 @@ static bool read_axis(const char *word, double axis[3])
     return true;
 }
 
-static arguments args = {.scene = {.label = -1, .material = {0, 0.45, 1000, 4}}};
+static arguments args = {.scene = {.label = -1, .material = {0, 0.45, 1000, PAL_DAMPING_DERIVED, 1}}};
 static const pal_flag flag[] = {
     {"-o", "DIR", PAL_FLAG_TEXT, &args.folder, 0, 0, "folder to write; made when it does not exist"},
     {"--procedural", NULL, PAL_FLAG_SWITCH, &args.procedural, 0, 0, "without IN: a computed organ"},
@@ -420,7 +439,10 @@ static const pal_flag flag[] = {
      "Poisson's ratio (0.45)"},
     {"--density-kg-m3", "RHO", PAL_FLAG_NUMBER, &args.scene.material.density_kg_m3, PAL_DENSITY_MIN_KG_M3,
      PAL_DENSITY_MAX_KG_M3, "density (1000)"},
-    {"--damping-1-s", "C", PAL_FLAG_NUMBER, &args.scene.material.damping_1_s, 0, PAL_NUMBER_MAX, "damping rate (4)"},
+    {"--damping-1-s", "C", PAL_FLAG_NUMBER, &args.scene.material.damping_1_s, 0, PAL_NUMBER_MAX,
+     "drag over mass (see --damping-ratio)"},
+    {"--damping-ratio", "Z", PAL_FLAG_NUMBER, &args.scene.material.damping_ratio, 0, PAL_DAMPING_RATIO_MAX,
+     "damping of the slowest mode over the critical one, as long as the rate stays below 4 1/s (1)"},
     {"--up", "AXIS", PAL_FLAG_TEXT, &args.up, 0, 0, "x, y, z, -x, -y or -z: the direction against gravity (z)"},
     {"--hold", "PERCENT", PAL_FLAG_NUMBER, &args.hold_percent, 0.1, 100,
      "lowest part of the height that is fixed (5; an open adaptive surface: its open edges)"},

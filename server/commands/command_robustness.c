@@ -1,77 +1,124 @@
-/* `palpate robustness SCENE`: the cases of server/robustness on a scene, what happened and whether that meets the
- * criterion. Exit code 1 when a case failed or could not be judged. */
+/* `palpate robustness SCENE...`: the cases of server/robustness on scenes, what happened and whether that meets the
+ * criterion. Exit code 1 when a case failed or could not be judged. Several scenes run in parallel, one on a core. */
+#include "server/base/team.h"
 #include "server/cli/flags.h"
 #include "server/commands/commands.h"
+#include "server/commands/robustness_table.h"
 #include "server/commands/scene_input.h"
 #include "server/figure/svg.h"
+#include "server/mesh/geometry/organ_family.h"
 #include "server/robustness/robustness.h"
+#include "server/scene/scene_import.h"
 
 #include <math.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+/* ---- reports ---- */
+
+static cJSON *answer_json(pal_answer answer)
+{
+    return answer == PAL_UNKNOWN ? cJSON_CreateNull() : JSON_BOOL(answer == PAL_YES);
+}
+
 static cJSON *result_json(const pal_robustness_result *r)
 {
-    static const char *const verdict[] = {"passed", "failed", "undecided", "skipped", "collapsed"};
     const pal_safeguards *s = &r->safeguards;
     cJSON *safeguards =
         PAL_JSON({"capped", JSON_NUMBER(s->n_capped)}, {"clamped", JSON_NUMBER(s->n_clamped)},
                  {"mass_scaled", JSON_NUMBER(s->n_mass_scaled)}, {"inverted", JSON_NUMBER(s->n_inversion)},
                  {"search", JSON_NUMBER(s->n_search)}, {"tool_reset", JSON_NUMBER(s->n_tool_reset)},
                  {"stopped", JSON_NUMBER(s->n_stopped)}, {"ns", JSON_NUMBER(s->ns)});
-    return PAL_JSON({"name", JSON_TEXT(r->name)}, {"what", JSON_TEXT(r->what)}, {"criterion", JSON_TEXT(r->criterion)},
-                    {"verdict", JSON_TEXT(verdict[r->verdict])}, {"happened", JSON_TEXT(r->diag)},
-                    {"finite", JSON_BOOL(r->finite)}, {"stopped", JSON_BOOL(r->frozen)},
-                    {"energy_excess", pal_json_finite(r->energy)}, {"energy_limit", pal_json_finite(r->limit)},
-                    {"energy_excluded", pal_json_finite(r->excluded_rise)},
-                    {"deviation_S", pal_json_finite(r->deviation_S)}, {"return_s", pal_json_finite(r->return_s)},
-                    {"simulated_s", pal_json_finite(r->simulated_s)}, {"cpu_s", pal_json_finite(r->took_s)},
-                    {"safeguards", safeguards});
+    return PAL_JSON(
+        {"name", JSON_TEXT(r->name)}, {"what", JSON_TEXT(r->what)}, {"criterion", JSON_TEXT(r->criterion)},
+        {"verdict", JSON_TEXT(pal_verdict_name(r->verdict))}, {"safe", answer_json(r->safe)},
+        {"recovered", answer_json(r->recovered)}, {"returns_s", pal_json_or_null(r->return_s)},
+        {"cause", JSON_TEXT(pal_cause_name(r->cause))}, {"happened", JSON_TEXT(r->diag)},
+        {"finite", JSON_BOOL(r->finite)}, {"stopped", JSON_BOOL(r->frozen)},
+        {"energy_excess", pal_json_finite(r->energy)}, {"energy_limit", pal_json_finite(r->limit)},
+        {"energy_excluded", pal_json_finite(r->excluded_rise)}, {"peak_contact_N", pal_json_finite(r->peak_contact_N)},
+        {"contact_cap_N", pal_json_finite(r->contact_cap_N)}, {"deviation_S", pal_json_finite(r->deviation_S)},
+        {"simulated_s", pal_json_finite(r->simulated_s)}, {"cpu_s", pal_json_finite(r->took_s)},
+        {"needs_s", r->needs_s > 0 ? pal_json_finite(r->needs_s) : NULL}, {"safeguards", safeguards});
 }
 
-static cJSON *as_json(const pal_scene *scene, const pal_robustness_options *options,
-                      const pal_robustness_report *report)
+static cJSON *job_json(const pal_robustness_job *job, const pal_robustness_options *options)
 {
+    const pal_robustness_report *report = job->report;
+    const int *count = report->count;
+    if (job->err)
+        return PAL_JSON({"ok", JSON_BOOL(false)}, {"name", JSON_TEXT(job->word)}, {"error", JSON_TEXT(job->diag.text)});
     cJSON *list = cJSON_CreateArray();
     for (int k = 0; k < report->n; k++) cJSON_AddItemToArray(list, result_json(&report->result[k]));
-    return PAL_JSON({"ok", JSON_BOOL(report->n_failed + report->n_undecided == 0)}, {"name", JSON_TEXT(scene->name)},
-                    {"seed", JSON_NUMBER(options->seed)}, {"rests", JSON_BOOL(report->rests)},
-                    {"settle_s", pal_json_finite(report->settle_s)}, {"cpu_s", pal_json_finite(report->took_s)},
-                    {"passed", JSON_NUMBER(report->n_passed)}, {"collapsed", JSON_NUMBER(report->n_collapsed)},
-                    {"failed", JSON_NUMBER(report->n_failed)}, {"undecided", JSON_NUMBER(report->n_undecided)},
-                    {"skipped", JSON_NUMBER(report->n_skipped)}, {"cases", list});
+    return PAL_JSON(
+        {"ok", JSON_BOOL(pal_robustness_job_good(job))}, {"name", JSON_TEXT(job->model[0] ? job->word : job->name)},
+        {"model", JSON_TEXT(job->model)}, {"seed", JSON_NUMBER(options->seed)}, {"rests", JSON_BOOL(report->rests)},
+        {"settle_s", pal_json_finite(report->settle_s)}, {"lowest_1_s", pal_json_finite(report->lowest_1_s)},
+        {"tau_s", pal_json_finite(report->tau_s)}, {"cpu_s", pal_json_finite(report->took_s)},
+        {"passed", JSON_NUMBER(count[PAL_VERDICT_PASSED])}, {"slow", JSON_NUMBER(count[PAL_VERDICT_SLOW])},
+        {"collapsed", JSON_NUMBER(count[PAL_VERDICT_COLLAPSED])}, {"failed", JSON_NUMBER(count[PAL_VERDICT_FAILED])},
+        {"undecided", JSON_NUMBER(count[PAL_VERDICT_UNDECIDED])}, {"skipped", JSON_NUMBER(count[PAL_VERDICT_SKIPPED])},
+        {"cases", list});
+}
+
+/* "-" where there is no number */
+typedef struct number_text {
+    char text[24];
+} number_text;
+
+static number_text format(const char *format, double value, bool known)
+{
+    number_text out = {"-"};
+    if (known && isfinite(value)) snprintf(out.text, sizeof out.text, format, value);
+    return out;
 }
 
 static void print_result(const pal_robustness_result *r)
 {
-    char energy[24] = "-", excluded[24] = "-", left[24] = "-", safeguards[64] = "";
-    if (isfinite(r->excluded_rise)) snprintf(excluded, sizeof excluded, "%.1g", r->excluded_rise);
-    if (isfinite(r->energy)) snprintf(energy, sizeof energy, "%.1g", r->energy);
-    if (isfinite(r->deviation_S)) snprintf(left, sizeof left, "%.2g", 100 * r->deviation_S);
+    static const char *const answer[] = {"-", "NO", "yes"};
+    char safeguards[64] = "";
+    const number_text returns = format("%.3g", r->return_s, true),
+                      contact = format("%.2g", r->peak_contact_N / r->contact_cap_N, r->peak_contact_N > 0),
+                      energy = format("%.1g", r->energy, true), excluded = format("%.1g", r->excluded_rise, true),
+                      left = format("%.2g", 100 * r->deviation_S, true);
     uint64_t n = pal_safeguards_sum(&r->safeguards);
     if (n > 0)
         snprintf(safeguards, sizeof safeguards, " (%llu safeguards, %.3g ms)", (unsigned long long)n,
                  1e-6 * (double)r->safeguards.ns);
-    printf("%-11s %-14s %9s %9s %9s %8.1f %7.2f  %s%s\n", r->name, pal_verdict_name(r->verdict), energy, excluded, left,
+    printf("%-11s %-10s %-4s %-9s %9s %8s %9s %9s %8s %8.1f %7.2f  %s%s\n", r->name, pal_verdict_name(r->verdict),
+           answer[r->safe], answer[r->recovered], returns.text, contact.text, energy.text, excluded.text, left.text,
            r->simulated_s, r->took_s, r->diag, safeguards);
-    if (r->verdict != PAL_VERDICT_FAILED) return;
-    printf("%26s%s\n%26scriterion: %s\n", "", r->what, "", r->criterion);
+    if (r->verdict == PAL_VERDICT_FAILED) printf("%12s%s\n%12scriterion: %s\n", "", r->what, "", r->criterion);
 }
 
-static void print(const pal_scene *scene, const pal_robustness_report *report)
+static void print_job(const pal_robustness_job *job)
 {
-    printf("%s: %s\n\n", scene->title,
-           report->rests ? "comes to rest by itself"
-           : report->led ? "has a prescribed motion without end: compared with an unloaded run"
-                         : "DOES NOT COME TO REST by itself");
-    printf("%-11s %-14s %9s %9s %9s %8s %7s  %s\n", "case", "verdict", "energy +", "excluded", "% S left", "sim s",
-           "cpu s", "what happened");
-    for (int k = 0; k < report->n; k++) print_result(&report->result[k]);
-    char collapsed[40] = "";
-    if (report->n_collapsed > 0) snprintf(collapsed, sizeof collapsed, " %d collapsed,", report->n_collapsed);
-    printf("\n%d passed,%s %d failed, %d undecided, %d do not apply; %.1f s of processor time\n", report->n_passed,
-           collapsed, report->n_failed, report->n_undecided, report->n_skipped, report->took_s);
+    const pal_robustness_report *report = job->report;
+    char collapsed[40] = "", slow[40] = "";
+    double max_s = 0;
+    if (job->summary[0]) printf("%s\n", job->summary);
+    printf("%s: %s\n\n", job->title,
+           report->rests  ? "comes to rest by itself"
+           : report->led  ? "has a prescribed motion without end: compared with an unloaded run"
+           : report->late ? "does not come to rest by itself in the time"
+                          : "DOES NOT COME TO REST by itself");
+    printf("%-11s %-10s %-4s %-9s %9s %8s %9s %9s %8s %8s %7s  %s\n", "case", "verdict", "safe", "recovered",
+           "returns s", "force/cap", "energy +", "excluded", "% S left", "sim s", "cpu s", "what happened");
+    for (int k = 0; k < report->n; k++)
+        print_result(&report->result[k]), max_s = fmax(max_s, report->result[k].needs_s);
+    const int *count = report->count;
+    if (count[PAL_VERDICT_COLLAPSED] > 0)
+        snprintf(collapsed, sizeof collapsed, " %d collapsed,", count[PAL_VERDICT_COLLAPSED]);
+    if (count[PAL_VERDICT_SLOW] > 0) snprintf(slow, sizeof slow, " %d slow,", count[PAL_VERDICT_SLOW]);
+    printf("\n%d passed,%s%s %d failed, %d undecided, %d do not apply; %.1f s of processor time\n",
+           count[PAL_VERDICT_PASSED], slow, collapsed, count[PAL_VERDICT_FAILED], count[PAL_VERDICT_UNDECIDED],
+           count[PAL_VERDICT_SKIPPED], report->took_s);
+    /* a case gets three times its part of the time */
+    if (max_s > 0)
+        printf("to judge what is undecided give about --seconds %.0f\n",
+               ceil(fmax(report->took_s, report->n > 3 ? max_s * report->n / 3 : max_s)));
 }
 
 /* ---- picture: x: simulated seconds; y: energy above that at rest as a share of its largest value ---- */
@@ -80,7 +127,7 @@ enum { COLUMNS = 4, WIDE = 250, HIGH = 170, LEFT = 46, TOP = 40, HEAD = 44, PLOT
 
 static const char *colour_of(pal_verdict verdict)
 {
-    static const char *const colour[] = {"#009e73", "#d55e00", "#e69f00", "#999999", "#cc79a7"};
+    static const char *const colour[] = {"#009e73", "#d55e00", "#e69f00", "#999999", "#cc79a7", "#0072b2"};
     return colour[verdict];
 }
 
@@ -145,59 +192,219 @@ static pal_err draw(const pal_robustness_report *report, const char *title, cons
     return pal_svg_end(&svg, path, diag);
 }
 
+/* ---- the command ---- */
+
+typedef struct run_all {
+    pal_robustness_job *job;
+    int n;
+    const pal_robustness_options *options;
+    const char *table; /* rewritten after each scene, so that a long run may be read, or ended, at any time */
+    pthread_mutex_t one_at_a_time;
+    pal_err table_err;
+    pal_diagnostic *diag;
+} run_all;
+
+static pal_err write_table(const char *path, const pal_robustness_job *job, int n, pal_diagnostic *diag)
+{
+    FILE *to = fopen(path, "w");
+    if (to) pal_robustness_table(to, job, n);
+    const bool good = to && !ferror(to);
+    if ((to && fclose(to)) || !good) return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: cannot be written", path);
+    return PAL_ERR_OK;
+}
+
+static pal_err open_generated(const pal_robustness_job *job, pal_loaded_scene **out, pal_diagnostic *diag)
+{
+    const pal_surface_scene options = {.label = -1,
+                                       .fem = !strcmp(job->model, "fem"),
+                                       .cells = !strcmp(job->model, "cells"),
+                                       .adaptive = !strcmp(job->model, "adaptive")};
+    return pal_scene_generated(job->word, &options, out, diag);
+}
+
+/* one scene, on one worker */
+static void run_job(void *user, int worker, int index)
+{
+    run_all *all = user;
+    pal_robustness_job *job = &all->job[index];
+    pal_scene_input input = {0};
+    pal_diagnostic reason = {""};
+    (void)worker;
+    job->err = job->model[0] ? open_generated(job, &input.loaded, &job->diag)
+                             : pal_scene_input_open(job->word, &input, &job->diag);
+    const pal_scene *scene = job->model[0] ? (input.loaded ? &input.loaded->scene : NULL) : input.studied.scene;
+    if (!job->err && (job->err = pal_robustness_run(scene, all->options, job->report, &reason)))
+        pal_diagnostic_set(&job->diag, job->err, "%s: %s", job->word, reason.text);
+    if (!job->err) {
+        snprintf(job->title, sizeof job->title, "%s", scene->title);
+        snprintf(job->name, sizeof job->name, "%s", scene->name);
+        snprintf(job->summary, sizeof job->summary, "%s", input.studied.summary);
+    }
+    if (job->model[0])
+        pal_scene_free(input.loaded);
+    else
+        pal_scene_input_close(&input);
+    pthread_mutex_lock(&all->one_at_a_time);
+    job->done = true;
+    if (all->table && !all->table_err) all->table_err = write_table(all->table, all->job, all->n, all->diag);
+    pthread_mutex_unlock(&all->one_at_a_time);
+}
+
+/* the jobs that the words name: every scene, and every organ as every model; how many, at most JOBS */
+enum { JOBS = 256 };
+static int add_organ(pal_robustness_job *job, int n, const char *name, const char *models)
+{
+    char model[16];
+    while (pal_flag_next_word(&models, model, sizeof model) && n < JOBS) {
+        snprintf(job[n].word, sizeof job[n].word, "%s", name);
+        snprintf(job[n++].model, sizeof job[n].model, "%s", model);
+    }
+    return n;
+}
+
+static int list_organs(pal_robustness_job *job, int n, const char *names, const char *models)
+{
+    char word[64], name[80];
+    const char *family;
+    while (pal_flag_next_word(&names, word, sizeof word)) {
+        bool known = false;
+        for (int k = 0; (family = pal_organ_family_name(k)); k++) {
+            if (strcmp(word, "all") != 0 && strcmp(word, family) != 0) continue;
+            known = true;
+            for (int seed = 1; seed <= PAL_FAMILY_SEEDS; seed++) {
+                snprintf(name, sizeof name, "%s:%d", family, seed);
+                n = add_organ(job, n, name, models);
+            }
+        }
+        if (!known) n = add_organ(job, n, word, models);
+    }
+    return n;
+}
+
+static void list_cases(char *text, size_t n_byte)
+{
+    size_t used = 0;
+    const char *name, *about;
+    for (int k = 0; (name = pal_robustness_case_name(k, &about)) && used < n_byte; k++)
+        used += (size_t)snprintf(text + used, n_byte - used, "  %-11s %s\n", name, about);
+}
+
+static bool known_models(const char *models)
+{
+    char word[16];
+    bool known = true;
+    while (pal_flag_next_word(&models, word, sizeof word))
+        known = known && pal_flag_word("springs|fem|adaptive|cells", word) >= 0;
+    return known;
+}
+
+/* runs the jobs, in parallel where there are several */
+static pal_err run(pal_robustness_job *job, int n, const pal_robustness_options *options, const char *table,
+                   pal_diagnostic *diag)
+{
+    run_all all = {job, n, options, table, PTHREAD_MUTEX_INITIALIZER, PAL_ERR_OK, diag};
+    pal_team *team = NULL;
+    for (int k = 0; k < n; k++)
+        if (!(job[k].report = calloc(1, sizeof *job[k].report)))
+            return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for %d scenes", n);
+    if (n > 1 && pal_team_create(0, &team))
+        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no workers for %d scenes", n);
+    if (team)
+        pal_team_run(team, n, run_job, &all);
+    else
+        run_job(&all, 0, 0);
+    pal_team_destroy(team);
+    if (n > 1 || !job[0].err) return all.table_err;
+    *diag = job[0].diag;
+    return job[0].err;
+}
+
+static void print_jobs(const pal_robustness_job *job, int n)
+{
+    for (int k = 0; k < n; k++) {
+        if (n > 1) printf("%s%s%s%s\n", k ? "\n" : "", job[k].word, job[k].model[0] ? " as " : "", job[k].model);
+        if (job[k].err)
+            printf("%s\n", job[k].diag.text);
+        else
+            print_job(&job[k]);
+    }
+    if (n == 1) return;
+    printf("\n");
+    pal_robustness_table(stdout, job, n);
+}
+
+static int report(pal_flag_common *common, const pal_robustness_job *job, int n, const pal_robustness_options *options)
+{
+    bool good = true;
+    for (int k = 0; k < n; k++) good = good && pal_robustness_job_good(&job[k]);
+    if (!common->json && !common->quiet) print_jobs(job, n);
+    if (common->json) {
+        cJSON *list = cJSON_CreateArray();
+        for (int k = 0; k < n && n > 1; k++) cJSON_AddItemToArray(list, job_json(&job[k], options));
+        cJSON *all = n > 1 ? PAL_JSON({"ok", JSON_BOOL(good)}, {"scenes", list}) : job_json(&job[0], options);
+        if (n == 1) cJSON_Delete(list);
+        const int code = pal_report_json(common, all);
+        if (code) return code;
+    }
+    return good ? 0 : 1;
+}
+
 int command_robustness(int argc, char **argv)
 {
     static char about[4096];
-    const char *picture = NULL, *only = NULL, *name, *of_case;
+    const char *picture = NULL, *only = NULL, *generate = NULL, *models = "springs,fem", *table_path = NULL;
     double seed = 1, seconds = 0;
     const pal_flag flag[] = {
         {"--only", "NAME", PAL_FLAG_TEXT, &only, 0, 0, "run this case alone"},
+        {"--generate", "ORGAN,...", PAL_FLAG_TEXT, &generate, 0, 0,
+         "run generated organs: FAMILY:SEED, FAMILY for its ten seeds, or all; families are\nslender, branched, "
+         "thin-walled and lobed"},
+        {"--model", "MODEL,...", PAL_FLAG_TEXT, &models, 0, 0,
+         "models of generated organs: springs, fem, adaptive, cells (springs,fem)"},
+        {"--table", "FILE.md", PAL_FLAG_TEXT, &table_path, 0, 0,
+         "write the answers by family and model as a table, anew after each scene"},
         {"--seed", "N", PAL_FLAG_NUMBER, &seed, 0, 1e15, "seed of the random numbers (1)"},
         {"--seconds", "S", PAL_FLAG_NUMBER, &seconds, 0.1, 1e6,
-         "processor time of all cases together (60, more where a step is expensive)"},
-        {"--picture", "FILE.svg", PAL_FLAG_TEXT, &picture, 0, 0, "plot the energy over time, one plot for each case"}};
-    int used =
-        snprintf(about, sizeof about,
-                 "Runs the cases that are known to break simulations on a scene, one after another, and reports what\n"
-                 "happened. Each case has a criterion: finite numbers, bounded energy, return to rest after release.\n"
-                 "Exit code 1 when a case fails its criterion or cannot be judged in the time.\n\nCASES\n");
-    for (int k = 0; (name = pal_robustness_case_name(k, &of_case)) && used < (int)sizeof about; k++)
-        used += snprintf(about + used, sizeof about - (size_t)used, "  %-11s %s\n", name, of_case);
-    const pal_flag_table table = {.usage = "robustness SCENE [flags]",
-                                  .about = about,
-                                  .example = "palpate prepare --shape sphere --resolution 6 --model fem -o ball\n"
-                                             "palpate robustness ball/scene.json --only meganewton --seconds 20\n",
-                                  PAL_FLAGS(flag),
-                                  .min_operand = 1,
-                                  .max_operand = 1};
+         "processor time of all cases of a scene together (60, more where a step is expensive)"},
+        {"--picture", "FILE.svg", PAL_FLAG_TEXT, &picture, 0, 0,
+         "one scene: plot the energy over time, one plot for each case"}};
+    int head = snprintf(
+        about, sizeof about,
+        "Runs the cases that are known to break simulations on scenes, one after another, and reports what\n"
+        "happened. Each case has three answers: is it safe (finite, bounded, energy and contact force within\n"
+        "their limits), does it recover its shape after release, and in how many seconds. Several scenes run\n"
+        "in parallel. Exit code 1 when a case fails its criterion or cannot be judged in the time.\n\nCASES\n");
+    list_cases(about + head, sizeof about - (size_t)head);
+    const pal_flag_table table = {
+        .usage = "robustness [SCENE...] [flags]",
+        .about = about,
+        .example = "palpate prepare --shape sphere --resolution 6 --model fem -o ball\n"
+                   "palpate robustness ball/scene.json --only meganewton --seconds 20\n"
+                   "palpate robustness --generate branched:5,lobed:7 --model fem --only inside --table inside.md\n",
+        PAL_FLAGS(flag),
+        .max_operand = JOBS / 2};
     pal_flag_common common;
-    const char *word[1];
+    const char *word[JOBS / 2], *name;
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
     if (code >= 0) return code;
     bool known = !only;
     for (int k = 0; (name = pal_robustness_case_name(k, NULL)) && !known; k++) known = !strcmp(only, name);
     if (!known) return pal_flags_wrong(&common, "there is no case \"%.60s\"", only);
+    if (!known_models(models)) return pal_flags_wrong(&common, "--model: known are springs, fem, adaptive and cells");
+    if (n == 0 && !generate) return pal_flags_wrong(&common, "needs a SCENE or --generate");
+    static pal_robustness_job job[JOBS];
+    for (int k = 0; k < n; k++) snprintf(job[k].word, sizeof job[k].word, "%s", word[k]);
+    if (generate) n = list_organs(job, n, generate, models);
+    if (picture && n > 1) return pal_flags_wrong(&common, "--picture: goes with one scene");
     pal_robustness_options options;
     pal_robustness_default(&options);
     options.seed = (uint64_t)seed, options.max_cpu_s = seconds, options.only = only;
-    options.progress = pal_report_continue, options.user = &common;
-    pal_scene_input input = {0};
+    if (n == 1) options.progress = pal_report_continue, options.user = &common;
     pal_diagnostic diag = {""};
-    pal_robustness_report *report = calloc(1, sizeof *report);
-    pal_err err = report ? pal_scene_input_open(word[0], &input, &diag) : PAL_ERR_MEMORY;
-    const pal_scene *scene = input.studied.scene;
-    if (!err) err = pal_diagnostic_prefix(&diag, pal_robustness_run(scene, &options, report, &diag), word[0]);
+    pal_err err = run(job, n, &options, table_path, &diag);
     pal_report_progress(NULL, 0, &common);
-    if (!err && picture) err = draw(report, scene->title, picture, &diag);
-    if (err) {
-        code = pal_report_refusal(&common, err, &diag);
-    } else {
-        code = common.json ? pal_report_json(&common, as_json(scene, &options, report)) : 0;
-        if (!common.json && !common.quiet && input.studied.summary[0]) printf("%s\n", input.studied.summary);
-        if (!common.json && !common.quiet) print(scene, report);
-        if (code == 0 && report->n_failed + report->n_undecided > 0) code = 1;
-    }
-    pal_scene_input_close(&input);
-    free(report);
+    if (!err && picture) err = draw(job[0].report, job[0].title, picture, &diag);
+    code = err ? pal_report_refusal(&common, err, &diag) : report(&common, job, n, &options);
+    for (int k = 0; k < n; k++) free(job[k].report);
     return code;
 }

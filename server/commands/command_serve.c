@@ -135,7 +135,7 @@ static pal_err open_sessions(serve_run *run, pal_diagnostic *diag)
     char record[PAL_CONFIG_TEXT + PAL_NAME + 2];
     for (int i = 0; i < run->n; i++) {
         const pal_scene *scene = run->studied[i].scene;
-        PAL_TRY(pal_preflight_run(scene, PAL_PREFLIGHT_QUICK, &run->preflight[i], diag));
+        PAL_TRY(pal_preflight_run(scene, &run->preflight[i], diag));
         pal_session_options options = {.wake = pal_server_gate_wake, .user = &run->gate, .only_observed = true};
         snprintf(record, sizeof record, run->n > 1 ? "%s.%s" : "%s", run->config.record, scene->name);
         if (run->config.record[0]) options.record_path = record;

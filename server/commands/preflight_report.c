@@ -39,6 +39,7 @@ static cJSON *body_json(const pal_preflight_body *b)
         {"thin_elements", weak_json(&b->thin)}, {"light_nodes", weak_json(&b->light)},
         {"locks", b->locks ? JSON_TEXT(b->locks) : NULL}, {"alternative", b->locks ? JSON_TEXT(b->instead) : NULL},
         {"condition", pal_json_finite(b->condition)}, {"slowest_s", pal_json_finite(b->slowest_period_s)},
+        {"lowest_1_s", pal_json_finite(b->omega_min_1_s)}, {"return_s", pal_json_finite(b->return_s)},
         {"predicted_ms", pal_json_finite(b->predicted_ms)});
 }
 
@@ -59,12 +60,13 @@ void pal_preflight_log(const pal_preflight *preflight, const char *scene)
         n_weak += body->edge.n + body->flat.n + body->thin.n + body->light.n;
         if (body->n_sub > n_sub) n_sub = body->n_sub;
         if (body->condition > condition) condition = body->condition;
+        if (body->slow[0]) pal_log(PAL_LOG_WARN, "preflight", "%s: body %s: %s", scene, body->name, body->slow);
         if (body->locks)
             pal_log(PAL_LOG_WARN, "preflight", "%s: body %s: element %s locks at Poisson's ratio %.4g, %s does not",
                     scene, body->name, body->locks, body->poisson, body->instead);
     }
     pal_log(n_weak > 0 ? PAL_LOG_WARN : PAL_LOG_INFO, "preflight",
-            "%s: %d sub-step%s a step, condition at least %.2g, %.1f MB, %d weak elements and nodes%s", scene, n_sub,
+            "%s: %d sub-step%s a step, condition %.2g, %.1f MB, %d weak elements and nodes%s", scene, n_sub,
             n_sub == 1 ? "" : "s", condition, 1e-6 * (double)preflight->n_byte, n_weak,
             n_weak > 0 ? " (palpate plan lists them)" : "");
 }

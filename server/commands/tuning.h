@@ -12,6 +12,9 @@
 #define PAL_MAX_BUSY        0.5
 #define PAL_MIN_EXTRA_SHARE 0.125
 #define PAL_MIN_EXTRA       400
+/* nodes up to which `palpate prepare` makes a world to find how fast the body returns, within two seconds
+ * (tests/house/test_commands.sh) */
+#define PAL_RETURN_NODES 6000
 /* Pa: Young's modulus that `palpate prepare` gives soft tissue, and the wall of a hollow organ, which is muscle */
 #define PAL_SOLID_YOUNG_PA 5000
 #define PAL_WALL_YOUNG_PA  50000

@@ -1,5 +1,4 @@
 /* Runs a robustness case: rest, monitored steps, return to rest, verdict. */
-
 #include "server/robustness/trial.h"
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
@@ -8,80 +7,27 @@
 
 #include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-
-#define ENERGY_RULE "+ 1 % (verlet 5 %, central_cg 30 %)"
-#define REST_LIMIT  "10 s or ten of its slowest periods (at most 120 s)"
-static const char rule_back[] =
-    "finite, not stopped, energy no more than put in " ENERGY_RULE ", rest within 0.1 % S in " REST_LIMIT;
-static const char rule_shape[] =
-    "finite, energy never above the case's " ENERGY_RULE ", rest within 0.1 % S in " REST_LIMIT "; "
-    "springs: bounded, that rest after a reset";
-static const char rule_blown[] =
-    "the same in 25 s, or stopped by finite_guard beyond its reach and at rest after a reset";
-static const char rule_long[] = "finite, not stopped, energy no more than put in " ENERGY_RULE
-                                ", rest within 0.1 % S; explicit: or refused beyond the budget, nothing moved";
-static const char rule_refused[] = "refused, not a bit of the state changed";
-
-static const pal_robustness_case cases[] = {
-    {"teleport", "a tool jumps by S through the body in one step and back", rule_back, pal_robustness_one_tool, 1},
-    {"inside", "a tool appears in the middle of the body", rule_back, pal_robustness_one_tool, 0},
-    {"pressed", "two tools press the body against each other", rule_back, pal_robustness_pressed, 0},
-    {"meganewton", "1e6 N on one vertex for 1 s, then gone", rule_back, pal_robustness_meganewton, 0},
-    {"flat", "all free nodes in one plane", rule_shape, pal_robustness_shape, PAL_FLAT},
-    {"point", "all free nodes on one point", rule_shape, pal_robustness_shape, PAL_POINT},
-    {"mirrored", "all free nodes mirrored", rule_shape, pal_robustness_shape, PAL_MIRRORED},
-    {"shuffled", "all free nodes anywhere in the box", rule_shape, pal_robustness_shape, PAL_SHUFFLED},
-    {"blown_up", "all free nodes a hundred times as far apart", rule_blown, pal_robustness_shape, PAL_BLOWN_UP},
-    {"stretched", "all free nodes eight times as far apart", rule_shape, pal_robustness_shape, PAL_STRETCHED},
-    {"dt_x10", "steps ten times as long after a blow", rule_long, pal_robustness_long_step, 10},
-    {"dt_x100", "steps a hundred times as long after a blow", rule_long, pal_robustness_long_step, 100},
-    {"numbers", "poses, loads, materials and steps of NaN, Inf and 1e300", rule_refused, pal_robustness_numbers, 0},
-    {"poisoned", "a NaN in the state of one body", "only that body stops, reports the node, and is reset alone",
-     pal_robustness_poisoned, 0},
-    {"supports", "supports are released and placed elsewhere while deformed, then restored",
-     "energy rises by at most 1 % at a switch, at rest within " REST_LIMIT, pal_robustness_supports, 0},
-    {"stiffer", "stiffness times a thousand while loaded, then back", "finite, not stopped, rest within 0.1 % S",
-     pal_robustness_stiffer, 0},
-    {"random", "300 steps of random poses, grasps, loads, materials and brushes, good and bad",
-     "finite, not stopped, rest within 0.1 % S", pal_robustness_random, 0},
-    {"hour", "an hour at rest under load",
-     "all 3,600 s monitored, drift below 1e-6 S, kinetic energy below 1e-9 of what is stored", pal_robustness_hour, 0},
-};
-enum { N_CASE = sizeof cases / sizeof cases[0] };
-
-const char *pal_robustness_case_name(int index, const char **about)
-{
-    if (index >= N_CASE) return NULL;
-    if (about) *about = cases[index].what;
-    return cases[index].name;
-}
-
-const char *pal_verdict_name(pal_verdict verdict)
-{
-    static const char *const name[] = {"passed", "FAILED", "undecided", "does not apply", "collapsed"};
-    return name[verdict];
-}
-
-void pal_robustness_default(pal_robustness_options *options)
-{
-    *options = (pal_robustness_options){.seed = 1};
-}
 
 /* ---- report ---- */
 
-void pal_trial_report(pal_trial *trial, pal_verdict verdict, const char *format, ...)
+void pal_trial_report(pal_trial *trial, pal_cause cause, const char *format, ...)
 {
     char *text = trial->out->diag;
-    pal_verdict *now = &trial->out->verdict;
     size_t used = strlen(text), room = sizeof trial->out->diag;
     va_list list;
     va_start(list, format);
     if (used > 0 && used + 2 < room) used += (size_t)snprintf(text + used, room - used, "; ");
     if (used < room) vsnprintf(text + used, room - used, format, list);
     va_end(list);
-    if (verdict == PAL_VERDICT_FAILED || verdict == PAL_VERDICT_SKIPPED || *now == PAL_VERDICT_PASSED) *now = verdict;
+    trial->causes |= 1u << cause;
+    if (cause < trial->out->cause) trial->out->cause = cause;
+}
+
+/* was one of the causes from first to last reported? */
+static bool has_cause(const pal_trial *trial, pal_cause first, pal_cause last)
+{
+    return (trial->causes & ((2u << last) - (1u << first))) != 0;
 }
 
 double pal_trial_random(pal_trial *trial)
@@ -213,12 +159,44 @@ void pal_trial_remove_loads(pal_trial *trial)
     pal_world_wake(trial->world);
 }
 
-double pal_trial_load_cap_N(const pal_trial *trial, int b)
+double pal_trial_load_cap_N(const pal_trial *trial, int b, int node)
 {
     const pal_body *body = pal_world_body(trial->world, b);
     double mass = 0;
     for (int i = 0; i < body->n_node; i++) mass += body->node_mass_kg[i];
-    return fmin(body->load_cap_N, 9.81 * mass);
+    return fmin(pal_body_node_load_cap_N(body, node), 9.81 * mass);
+}
+
+void pal_trial_load(pal_trial *trial, double share, const double direction[3])
+{
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(trial->world, b);
+        const int far = pal_trial_far_node(trial, b);
+        double sum = 0, all_N = share * pal_trial_load_cap_N(trial, b, far);
+        for (int pass = 0; pass < 2; pass++)
+            for (int k = 0; k < pal_body_nodes(body); k++) {
+                const int i = pal_body_point(body, k);
+                const double bears_N = pal_body_node_load_cap_N(body, i);
+                double force[3];
+                if (pal_dist3(body->node_rest + 3 * (size_t)i, body->node_rest + 3 * (size_t)far) > 1.01 * body->edge_m)
+                    continue;
+                if (pass == 0) sum += bears_N;
+                if (pass == 0) continue;
+                pal_scale3(force, all_N * bears_N / sum, direction);
+                trial->err = pal_world_load(trial->world, b, i, force);
+            }
+    }
+}
+
+double pal_trial_extent_S(const pal_trial *trial)
+{
+    double max = 0;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        double low[3], high[3];
+        pal_trial_box(trial, b, low, high);
+        max = fmax(max, pal_dist3(low, high) / pal_world_body(trial->world, b)->length_scale_m);
+    }
+    return max;
 }
 
 int pal_trial_far_node(const pal_trial *trial, int b)
@@ -275,8 +253,15 @@ static void monitor(pal_trial *trial)
         const pal_body *body = pal_world_body(trial->world, b);
         out->finite &= pal_body_finite(body);
         if (body->frozen && !out->frozen)
-            pal_trial_report(trial, PAL_VERDICT_PASSED, "%s stopped: %s", body->name, body->reason);
+            pal_trial_report(trial, PAL_CAUSE_NONE, "%s stopped: %s", body->name, body->reason);
         out->frozen |= body->frozen, trial->stopped[b] |= body->frozen;
+    }
+    const pal_tools *tools = pal_world_tools(trial->world);
+    for (int t = 0; t < tools->n_tool; t++) {
+        const pal_tool *tool = &tools->tool[t];
+        const double force_N = fmax(pal_norm3(tool->force_N), pal_norm3(tool->mean_force_N));
+        if (out->contact_cap_N > 0 && force_N * out->contact_cap_N <= out->peak_contact_N * tool->force_cap_N) continue;
+        out->peak_contact_N = force_N, out->contact_cap_N = tool->force_cap_N;
     }
     double energy = pal_world_energy_J(trial->world);
     trial->scale_J = fmax(trial->scale_J, fabs(energy - trial->rest_J));
@@ -320,36 +305,97 @@ bool pal_trial_run(pal_trial *trial, double seconds)
     return true;
 }
 
-/* sets deviation_S and return_s */
-static void relax(pal_trial *trial, double seconds)
+/* Elements of bodies that have to return. Bodies whose elements are not on their own points count their recoveries. */
+static int count_inverted(const pal_trial *trial, uint64_t *n_recovery)
 {
+    int n = 0;
+    uint64_t before = *n_recovery;
+    *n_recovery = 0;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(trial->world, b);
+        if (excused(trial, b)) continue;
+        if (body->interpolation) *n_recovery += body->safeguards.n_inversion;
+        for (int t = 0; body->tets && !body->interpolation && t < body->tets->n_tet; t++) {
+            const int32_t *tet = body->tets->tet + 4 * (size_t)t;
+            n += pal_tet_volume(body->x, tet) * pal_tet_volume(body->x_rest, tet) < 0;
+        }
+    }
+    return n > 0 ? n : *n_recovery > before;
+}
+
+static bool all_asleep(const pal_trial *trial)
+{
+    bool all = true;
+    for (int b = 0; b < trial->scene->n_body; b++) all = all && pal_world_body(trial->world, b)->asleep;
+    return all;
+}
+
+/* sets deviation_S, return_s and needs_s; OPEN: it was cut short */
+static pal_return_state watch_return(pal_trial *trial, double seconds, int *n_inverted)
+{
+    enum { EACH = 6 }; /* steps */
     pal_robustness_result *out = trial->out;
-    double begin = out->simulated_s, rest_time_s = 0;
-    int n =
-        (int)ceil((seconds < PAL_RETURN_TIME_S ? seconds : fmax(seconds, trial->return_time_s)) / trial->scene->step_s);
-    out->return_s = INFINITY;
-    trial->needs_rest = true, trial->has_returned = false;
-    for (int i = 0; i < n && out->finite && !halted(trial) && !trial->late; i++) {
+    pal_return_watch watch;
+    pal_return_look look = {.left_S = pal_trial_deviation_S(trial, false)};
+    pal_return_state state = PAL_RETURN_OPEN;
+    const double begin = out->simulated_s, begin_cpu = pal_trial_cpu_s(),
+                 limit = seconds < PAL_RETURN_TIME_S
+                             ? seconds
+                             : pal_return_limit_s(trial->lowest_1_s, trial->tau_s, look.left_S, seconds);
+    uint64_t n_recovery = 0;
+    *n_inverted = count_inverted(trial, &n_recovery);
+    pal_return_watch_begin(&watch, trial->tau_s, limit);
+    for (int i = 1; state == PAL_RETURN_OPEN && out->finite && !halted(trial) && !trial->late; i++) {
         if (!pal_trial_step(trial, trial->scene->step_s)) break;
-        double left = pal_trial_deviation_S(trial, false), now = out->simulated_s - begin;
-        if (!(left <= PAL_RETURN_S))
-            out->return_s = INFINITY;
-        else if (isinf(out->return_s))
-            out->return_s = now;
-        if (now - out->return_s >= PAL_REST_HOLD_S) break;
-        /* what no longer moves will not return either */
-        rest_time_s = pal_trial_speed_S_s(trial) <= PAL_REST_SPEED_S_S ? rest_time_s + trial->scene->step_s : 0;
-        if (rest_time_s > 2 * PAL_REST_HOLD_S) break;
+        if (i % EACH == 0) *n_inverted = count_inverted(trial, &n_recovery);
+        look = (pal_return_look){.time_s = out->simulated_s - begin,
+                                 .left_S = pal_trial_deviation_S(trial, false),
+                                 .speed_S_s = pal_trial_speed_S_s(trial),
+                                 .inverted = *n_inverted > 0,
+                                 .asleep = all_asleep(trial)};
+        state = pal_return_watch_look(&watch, &look);
     }
     out->deviation_S = pal_trial_deviation_S(trial, false);
-    trial->has_returned = out->return_s < INFINITY || pal_trial_deviation_S(trial, true) <= PAL_RETURN_S;
+    out->return_s = watch.return_s;
+    if (trial->late && look.time_s > 0) out->needs_s = (pal_trial_cpu_s() - begin_cpu) * limit / look.time_s;
+    return state;
 }
 
 void pal_trial_return(pal_trial *trial, double seconds)
 {
-    relax(trial, seconds);
-    if (trial->out->return_s < INFINITY)
-        pal_trial_report(trial, PAL_VERDICT_PASSED, "back after %.2g s", trial->out->return_s);
+    static const pal_cause cause[] = {[PAL_RETURN_INVERTED] = PAL_CAUSE_INVERTED,
+                                      [PAL_RETURN_ASLEEP] = PAL_CAUSE_ASLEEP,
+                                      [PAL_RETURN_STUCK] = PAL_CAUSE_STUCK,
+                                      [PAL_RETURN_MOVES] = PAL_CAUSE_MOVES};
+    static const char *const how[] = {[PAL_RETURN_INVERTED] = "",
+                                      [PAL_RETURN_ASLEEP] = "asleep ",
+                                      [PAL_RETURN_STUCK] = "stands still ",
+                                      [PAL_RETURN_MOVES] = "still moves "};
+    pal_robustness_result *out = trial->out;
+    int n_inverted;
+    const double before = pal_trial_extent_S(trial);
+    const pal_return_state state = watch_return(trial, seconds, &n_inverted);
+    const double after = pal_trial_extent_S(trial), left = 100 * out->deviation_S;
+    if (out->finite && !out->frozen && !(after <= 1.5 * fmax(before, 1)))
+        pal_trial_report(trial, PAL_CAUSE_BOUNDS, "grew to %.2g S", after);
+    trial->slow = state == PAL_RETURN_SLOW;
+    if (state != PAL_RETURN_OPEN) trial->late = false; /* it was judged in the last step of its time */
+    if (state == PAL_RETURN_BACK)
+        pal_trial_report(trial, PAL_CAUSE_NONE, "back after %.2g s", out->return_s);
+    else if (state == PAL_RETURN_SLOW)
+        pal_trial_report(trial, PAL_CAUSE_NONE, "%.2g %% S away after %.1f s, returns in %.3g s", left,
+                         out->simulated_s, out->return_s);
+    else if (pal_trial_deviation_S(trial, true) <= PAL_RETURN_S && n_inverted == 0)
+        pal_trial_report(trial, PAL_CAUSE_NONE, "%.2g %% S away after %.1f s", left, out->simulated_s);
+    else if (!trial->rests && !trial->twin)
+        pal_trial_report(trial, trial->rest_late ? PAL_CAUSE_SECONDS : PAL_CAUSE_NO_REST,
+                         "not judged, the scene does not come to rest by itself%s",
+                         trial->rest_late ? " in the time" : "");
+    else if (state != PAL_RETURN_OPEN)
+        pal_trial_report(trial, cause[state], "%s%.2g %% S from rest after %.1f s, %d elements inverted", how[state],
+                         left, out->simulated_s, n_inverted);
+    else if (!trial->late && out->finite && !halted(trial))
+        pal_trial_report(trial, PAL_CAUSE_MOVES, "a step of the return was refused");
 }
 
 /* ---- verdicts ---- */
@@ -372,211 +418,119 @@ static double energy_limit(const pal_trial *trial)
                                                                          : PAL_ENERGY_SLACK;
 }
 
-static void judge(pal_trial *trial)
+/* what was seen in any step */
+static void judge_steps(pal_trial *trial)
 {
     pal_robustness_result *out = trial->out;
     /* a driving support does work continuously */
     bool judged = !isnan(out->energy) && trial->scale_J > 0 && !trial->twin;
     /* a smaller energy input is rounding, and a share of it is meaningless */
-    for (int b = 0; b < trial->scene->n_body; b++)
-        trial->scale_J = fmax(trial->scale_J, PAL_NO_ENERGY * pal_trial_load_cap_N(trial, b) *
-                                                  pal_world_body(trial->world, b)->length_scale_m);
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        const double bears_N = pal_trial_load_cap_N(trial, b, pal_trial_far_node(trial, b));
+        trial->scale_J =
+            fmax(trial->scale_J, PAL_NO_ENERGY * bears_N * pal_world_body(trial->world, b)->length_scale_m);
+    }
     out->limit = energy_limit(trial);
     out->energy = judged ? trial->excess_J / trial->scale_J : (double)NAN;
     out->excluded_rise = judged ? trial->excluded_rise_J / trial->scale_J : (double)NAN;
-    if (out->verdict == PAL_VERDICT_SKIPPED) return;
-    if (!out->finite) pal_trial_report(trial, PAL_VERDICT_FAILED, "a number is not finite");
+    if (!out->finite) pal_trial_report(trial, PAL_CAUSE_NUMBER, "a number is not finite");
     for (int b = 0; b < trial->scene->n_body; b++)
         if (trial->stopped[b] && !trial->may_stop[b])
-            pal_trial_report(trial, PAL_VERDICT_FAILED, "%s was stopped", trial->scene->body[b].name);
+            pal_trial_report(trial, PAL_CAUSE_STOPPED, "%s was stopped", trial->scene->body[b].name);
+    if (out->peak_contact_N > 0) pal_trial_report(trial, PAL_CAUSE_NONE, "force up to %.3g N", out->peak_contact_N);
+    if (out->peak_contact_N > out->contact_cap_N * (1 + 1e-9))
+        pal_trial_report(trial, PAL_CAUSE_CONTACT, "beyond the cap of %.3g N", out->contact_cap_N);
     if (out->finite && !out->frozen && judged && !(out->energy <= out->limit))
-        pal_trial_report(trial, PAL_VERDICT_FAILED, "energy rose by %.2g of what was put in, allowed %.2g", out->energy,
+        pal_trial_report(trial, PAL_CAUSE_ENERGY, "energy rose by %.2g of what was put in, allowed %.2g", out->energy,
                          out->limit);
-    if (out->verdict == PAL_VERDICT_FAILED || out->verdict == PAL_VERDICT_UNDECIDED) return;
-    bool all_excused = true;
-    for (int b = 0; b < trial->scene->n_body; b++) all_excused = all_excused && excused(trial, b);
-    if (trial->late && !all_excused && !(trial->needs_rest && trial->has_returned))
-        pal_trial_report(trial, PAL_VERDICT_UNDECIDED,
-                         "not judged, the time was over after %.1f simulated s: give more --seconds", out->simulated_s);
-    else if (trial->needs_rest && !trial->rests && !trial->twin)
-        pal_trial_report(trial, PAL_VERDICT_UNDECIDED, "not judged, the scene does not come to rest by itself");
-    else if (trial->needs_rest && !trial->has_returned)
-        pal_trial_report(trial, PAL_VERDICT_FAILED, "%.2g %% S from rest at the end",
-                         100 * pal_trial_deviation_S(trial, true));
 }
 
 /* A body that was stopped or stayed away must be at rest after a reset. Keeps the figures of the case. */
 static void check_reset(pal_trial *trial, double seconds)
 {
     pal_robustness_result *out = trial->out, was = *out;
+    int n_inverted;
     pal_world_reset(trial->world);
     if (trial->twin) pal_world_reset(trial->twin);
     out->frozen = false, out->n_sample = 0, trial->late = false;
     memset(trial->stopped, 0, sizeof trial->stopped);
     memset(trial->may_stay, 0, sizeof trial->may_stay);
     trial->deadline_s = fmax(trial->deadline_s, pal_trial_cpu_s() + 0.5 * seconds);
-    relax(trial, PAL_RETURN_TIME_S);
+    const pal_return_state state = watch_return(trial, PAL_RETURN_TIME_S, &n_inverted);
+    const bool stopped = out->frozen || !out->finite;
     const double left = out->deviation_S;
-    const bool stopped = out->frozen || !out->finite, back = trial->has_returned;
-    memcpy(was.diag, out->diag, sizeof was.diag);
     *out = was;
     if (stopped)
-        pal_trial_report(trial, PAL_VERDICT_FAILED, "a reset did not bring it back");
-    else if (trial->rests && !back && trial->late)
-        pal_trial_report(trial, PAL_VERDICT_UNDECIDED, "not judged after its reset: give more --seconds");
-    else if (trial->rests && !back)
-        pal_trial_report(trial, PAL_VERDICT_FAILED, "%.2g %% S from rest %.0f s after a reset", 100 * left,
+        pal_trial_report(trial, PAL_CAUSE_INPUT, "a reset did not bring it back");
+    else if (trial->rests && trial->late)
+        pal_trial_report(trial, PAL_CAUSE_SECONDS, "not judged after its reset");
+    else if (trial->rests && state != PAL_RETURN_BACK)
+        pal_trial_report(trial, PAL_CAUSE_INPUT, "%.2g %% S from rest %.0f s after a reset", 100 * left,
                          PAL_RETURN_TIME_S);
+    else
+        pal_trial_report(trial, PAL_CAUSE_NONE, "a reset brings it back");
 }
 
-static void run_one(pal_trial *trial, const pal_robustness_case *which, double seconds)
+/* the answers and the verdict from what was reported */
+static void answer(pal_trial *trial)
+{
+    pal_robustness_result *out = trial->out;
+    const bool unsafe = has_cause(trial, PAL_CAUSE_NUMBER, PAL_CAUSE_INPUT),
+               away = has_cause(trial, PAL_CAUSE_INVERTED, PAL_CAUSE_MOVES),
+               collapsed = has_cause(trial, PAL_CAUSE_COLLAPSED, PAL_CAUSE_COLLAPSED),
+               skipped = has_cause(trial, PAL_CAUSE_NOT_APPLICABLE, PAL_CAUSE_NOT_APPLICABLE),
+               open = skipped || has_cause(trial, PAL_CAUSE_SECONDS, PAL_CAUSE_NO_REST);
+    out->safe = unsafe ? PAL_NO : open ? PAL_UNKNOWN : PAL_YES;
+    out->recovered = away || collapsed ? PAL_NO : open ? PAL_UNKNOWN : PAL_YES;
+    out->verdict = skipped          ? PAL_VERDICT_SKIPPED
+                   : unsafe || away ? PAL_VERDICT_FAILED
+                   : open           ? PAL_VERDICT_UNDECIDED
+                   : collapsed      ? PAL_VERDICT_COLLAPSED
+                   : trial->slow    ? PAL_VERDICT_SLOW
+                                    : PAL_VERDICT_PASSED;
+    if (out->verdict != PAL_VERDICT_UNDECIDED || !has_cause(trial, PAL_CAUSE_SECONDS, PAL_CAUSE_SECONDS)) return;
+    out->needs_s = fmax(out->needs_s, 2 * out->took_s);
+    pal_trial_report(trial, PAL_CAUSE_NONE, "needs about %.0f s of processor time", out->needs_s);
+}
+
+void pal_trial_run_case(pal_trial *trial, const pal_robustness_case *which, double seconds)
 {
     pal_robustness_result *out = trial->out;
     double begin = pal_trial_cpu_s();
     *out = (pal_robustness_result){.name = which->name,
                                    .what = which->what,
                                    .criterion = which->criterion,
+                                   .cause = PAL_CAUSE_NONE,
                                    .finite = true,
                                    .deviation_S = NAN,
                                    .return_s = NAN};
     trial->deadline_s = begin + seconds;
     trial->base_J = trial->scale_J = trial->excess_J = trial->allowed_J = trial->excluded_rise_J = 0;
-    trial->n_skip = 1, trial->since = 0, trial->count = 0;
-    trial->late = trial->needs_rest = trial->has_returned = false;
+    trial->n_skip = 1, trial->since = 0, trial->count = 0, trial->causes = 0;
+    trial->late = trial->slow = false;
     memset(trial->stopped, 0, sizeof trial->stopped);
     memset(trial->may_stop, 0, sizeof trial->may_stop);
     memset(trial->may_stay, 0, sizeof trial->may_stay);
+    bool collapsed = false;
     if (!pal_trial_back_to_rest(trial)) {
-        pal_trial_report(trial, PAL_VERDICT_UNDECIDED, "not judged, the scene did not come to rest before it");
-        return;
-    }
-    pal_trial_rebase(trial);
-    sample(trial);
-    trial->parameter = which->parameter;
-    which->run(trial);
-    sum_safeguards(trial);
-    judge(trial);
-    /* a folded subdivision solid has other rest states, as elements with one rotation each do; springs whose shape was
-     * destroyed may not recover it by themselves */
-    const bool failed = out->verdict == PAL_VERDICT_FAILED && trial->needs_rest && !trial->has_returned && !trial->late;
-    bool folded = false, collapsed = false, reset = out->frozen;
-    for (int b = 0; b < trial->scene->n_body; b++) {
-        const bool away = !(body_deviation_S(trial, b) <= PAL_RETURN_S);
-        folded |= failed && away && pal_world_body(trial->world, b)->interpolation;
-        collapsed |= trial->may_stay[b] && (trial->stopped[b] || away);
-        reset |= trial->may_stay[b] && !(out->return_s < INFINITY);
-    }
-    reset |= folded;
-    if (out->verdict != PAL_VERDICT_SKIPPED && reset) check_reset(trial, seconds);
-    if (folded && trial->has_returned)
-        pal_trial_report(
-            trial, PAL_VERDICT_PASSED, "a reset brings it back%s",
-            energy_limit(trial) == PAL_ENERGY_SLACK_CENTRAL ? ", solver implicit_euler comes back from more" : "");
-    if (collapsed && out->verdict == PAL_VERDICT_PASSED) {
-        out->verdict = PAL_VERDICT_COLLAPSED;
-        pal_trial_report(trial, PAL_VERDICT_PASSED, "a reset brings it back");
+        pal_trial_report(trial, PAL_CAUSE_SECONDS, "not judged, the scene did not come to rest before it");
+    } else {
+        pal_trial_rebase(trial);
+        sample(trial);
+        trial->parameter = which->parameter;
+        which->run(trial);
+        sum_safeguards(trial);
+        judge_steps(trial);
+        bool all_excused = true;
+        for (int b = 0; b < trial->scene->n_body; b++) {
+            all_excused = all_excused && excused(trial, b);
+            collapsed |= trial->may_stay[b] && (trial->stopped[b] || !(body_deviation_S(trial, b) <= PAL_RETURN_S));
+        }
+        if (trial->late && !all_excused)
+            pal_trial_report(trial, PAL_CAUSE_SECONDS, "the time was over after %.1f simulated s", out->simulated_s);
+        if (out->frozen || collapsed) check_reset(trial, seconds);
+        if (collapsed) pal_trial_report(trial, PAL_CAUSE_COLLAPSED, "springs that may not recover");
     }
     out->took_s = pal_trial_cpu_s() - begin;
-}
-
-/* ---- all cases ---- */
-
-static void find_components(pal_trial *trial)
-{
-    trial->settles_each = pal_world_find_component(trial->world, -1, "moving_support") >= 0 ||
-                          pal_world_find_component(trial->world, -1, "inflate") >= 0;
-    for (int b = trial->scene->n_body - 1; b >= 0; b--) {
-        trial->settles_each |= pal_world_body(trial->world, b)->active != NULL;
-        if (pal_world_find_component(trial->world, b, "tool_push") < 0) continue;
-        trial->touches = true;
-        trial->body = b;
-    }
-}
-
-static pal_err open_trial(pal_trial *trial, const pal_scene *scene)
-{
-    trial->scene = malloc(sizeof *trial->scene);
-    if (!trial->scene) return PAL_ERR_MEMORY;
-    *trial->scene = *scene;
-    if (scene->n_tool < 2) {
-        pal_tool_def own = scene->tool[0];
-        pal_tools_default(trial->scene, 2);
-        if (scene->n_tool == 1) trial->scene->tool[0] = own;
-    }
-    PAL_TRY(pal_world_create(trial->scene, trial->diag, &trial->world));
-    for (int b = 0; b < scene->n_body; b++) {
-        size_t n3 = 3 * (size_t)pal_world_body(trial->world, b)->n_dof;
-        trial->rest[b] = calloc(n3 + 1, sizeof(double));
-        trial->start[b] = calloc(n3 + 1, sizeof(double));
-        if (!trial->rest[b] || !trial->start[b]) return PAL_ERR_MEMORY;
-    }
-    find_components(trial);
-    return PAL_ERR_OK;
-}
-
-static void close_trial(pal_trial *trial)
-{
-    pal_world_destroy(trial->world);
-    pal_world_destroy(trial->twin);
-    for (int b = 0; b < PAL_BODY_MAX; b++) free(trial->rest[b]), free(trial->start[b]);
-    free(trial->scene);
-}
-
-/* processor time of all cases, from the cost of a step in the rest state */
-static double enough_s(pal_trial *trial)
-{
-    enum { PROBE = 10 };
-    double before = pal_trial_cpu_s();
-    for (int i = 0; i < PROBE; i++) {
-        for (int b = 0; b < trial->scene->n_body; b++) (void)pal_world_invalidate_limits(trial->world, b);
-        (void)pal_world_step(trial->world, trial->scene->step_s);
-    }
-    double step_s = (pal_trial_cpu_s() - before) / PROBE;
-    return fmin(1800, fmax(PAL_ROBUSTNESS_CPU_S, PAL_ROBUSTNESS_SIMULATED_S / trial->scene->step_s * step_s));
-}
-
-static pal_err run_all(pal_trial *trial, pal_robustness_report *out)
-{
-    const pal_robustness_options *o = trial->options;
-    double begin = pal_trial_cpu_s();
-    trial->deadline_s = begin + (o->max_cpu_s > 0 ? 0.5 * o->max_cpu_s : PAL_ROBUSTNESS_CPU_S);
-    if (o->progress && !o->progress("rest", 0, o->user)) return PAL_ERR_STATE;
-    out->rests = trial->rests = pal_trial_settle(trial, &out->settle_s);
-    /* a scene that did not come to rest because a support drives it is compared with an undisturbed run */
-    if (!trial->rests && !trial->late && pal_world_find_component(trial->world, -1, "moving_support") >= 0)
-        out->led = !pal_world_create(trial->scene, NULL, &trial->twin);
-    pal_trial_save(trial, trial->rest);
-    trial->rest_J = pal_world_energy_J(trial->world);
-    trial->return_time_s = pal_trial_return_time_s(trial);
-    const double max_cpu_s = o->max_cpu_s > 0 ? o->max_cpu_s : enough_s(trial);
-    for (int k = 0; k < N_CASE; k++) {
-        if (o->only && strcmp(o->only, cases[k].name)) continue;
-        if (o->progress && !o->progress(cases[k].name, (double)k / N_CASE, o->user))
-            return pal_diagnostic_set(trial->diag, PAL_ERR_STATE, "stopped before the case %s", cases[k].name);
-        double left = begin + max_cpu_s - pal_trial_cpu_s();
-        /* short cases leave their time to the others; none takes more than a third of the remainder */
-        int n_left = o->only ? 1 : N_CASE - k;
-        trial->out = &out->result[out->n++];
-        run_one(trial, &cases[k], fmax(0.2, n_left > 3 ? fmin(left / 3, 3 * left / n_left) : left / n_left));
-    }
-    int *const n[] = {&out->n_passed, &out->n_failed, &out->n_undecided, &out->n_skipped, &out->n_collapsed};
-    for (int i = 0; i < out->n; i++) ++*n[out->result[i].verdict];
-    out->took_s = pal_trial_cpu_s() - begin;
-    return PAL_ERR_OK;
-}
-
-pal_err pal_robustness_run(const pal_scene *scene, const pal_robustness_options *options, pal_robustness_report *out,
-                           pal_diagnostic *diag)
-{
-    bool known = !options->only;
-    for (int k = 0; k < N_CASE && !known; k++) known = !strcmp(options->only, cases[k].name);
-    if (!known) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is no case \"%.60s\"", options->only);
-    pal_trial trial = {.options = options, .diag = diag};
-    pal_robustness_report *report = calloc(1, sizeof *report);
-    pal_err err = report ? open_trial(&trial, scene) : PAL_ERR_MEMORY;
-    if (!err) err = run_all(&trial, report);
-    if (!err) *out = *report;
-    close_trial(&trial);
-    free(report);
-    return err;
+    answer(trial);
 }

@@ -1,9 +1,7 @@
 /* The rest state of a trial's scene, and the undisturbed run that replaces it for a driven scene. */
 #include "server/base/vec3.h"
 #include "server/robustness/trial.h"
-#include "server/solve/preflight.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 double pal_trial_speed_S_s(const pal_trial *trial)
@@ -24,24 +22,37 @@ double pal_trial_speed_S_s(const pal_trial *trial)
 
 /* ---- rest ---- */
 
-double pal_trial_return_time_s(const pal_trial *trial)
+void pal_trial_find_times(pal_trial *trial)
 {
-    double max = 0;
-    pal_preflight *preflight = malloc(sizeof *preflight);
-    if (preflight && !pal_preflight_run(trial->scene, PAL_PREFLIGHT_FULL, preflight, NULL))
-        for (int b = 0; b < preflight->n_body; b++)
-            max = fmax(max, preflight->body[b].slowest_period_s); /* fmax ignores NaN */
-    free(preflight);
-    return fmax(PAL_RETURN_TIME_S, fmin(12 * PAL_RETURN_TIME_S, 10 * max));
+    trial->lowest_1_s = trial->tau_s = 0;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(trial->world, b);
+        if (!(body->lowest_1_s > 0)) (void)pal_world_find_lowest(trial->world, b, NULL);
+        if (!(body->lowest_1_s > 0)) continue; /* nothing holds it */
+        if (!(trial->lowest_1_s > 0 && trial->lowest_1_s < body->lowest_1_s)) trial->lowest_1_s = body->lowest_1_s;
+        trial->tau_s = fmax(trial->tau_s, pal_body_return_s(body));
+    }
+}
+
+double pal_trial_long_step_s(const pal_trial *trial)
+{
+    for (int b = 0; b < trial->scene->n_body; b++)
+        if (!pal_world_body(trial->world, b)->implicit) return trial->scene->step_s;
+    return fmin(PAL_RETURN_TIME_S, fmax(PAL_LONG_STEP_TAU * trial->tau_s, trial->scene->step_s));
 }
 
 bool pal_trial_settle(pal_trial *trial, double *took_s)
 {
-    const double step = trial->scene->step_s;
+    const double max_s = fmax(3 * PAL_RETURN_TIME_S, PAL_SETTLE_TAU * fmax(trial->tau_s, pal_trial_long_step_s(trial))),
+                 still_S_s = fmin(PAL_REST_SPEED_S_S, 0.1 * PAL_RETURN_S / fmax(trial->tau_s, 1e-9));
     double rest_time_s = 0, t = 0;
-    for (; t < 3 * PAL_RETURN_TIME_S && rest_time_s < PAL_REST_HOLD_S; t += step) {
-        if (pal_world_step(trial->world, step) || pal_trial_cpu_s() > trial->deadline_s) return false;
-        rest_time_s = pal_trial_speed_S_s(trial) <= PAL_REST_SPEED_S_S ? rest_time_s + step : 0;
+    /* what falls into its weight swings first */
+    while (t < max_s && rest_time_s < PAL_REST_HOLD_S) {
+        const double step = t < PAL_RETURN_TIME_S ? trial->scene->step_s : pal_trial_long_step_s(trial);
+        trial->late = pal_trial_cpu_s() > trial->deadline_s;
+        if (trial->late || pal_world_step(trial->world, step)) return false;
+        t += step;
+        rest_time_s = pal_trial_speed_S_s(trial) <= still_S_s ? rest_time_s + step : 0;
     }
     *took_s = t;
     return rest_time_s >= PAL_REST_HOLD_S;

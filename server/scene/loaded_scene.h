@@ -44,6 +44,7 @@ typedef struct pal_surface_scene {
     /* model fem in place of springs */
     bool fem;
     const char *element, *law, *solver; /* NULL: hex8_bbar, corotational, implicit_euler */
+    bool cells; /* generated organs only: subdivision_fem on voxels of twice the edge as control cells */
     /* model adaptive_springs in place of springs: the surface as it is, without voxels */
     bool adaptive;
     int n_level;        /* 0: 2                                                           */

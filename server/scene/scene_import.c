@@ -13,6 +13,7 @@
 #include "server/base/vec3.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/mesh/geometry/organ.h"
+#include "server/mesh/geometry/organ_family.h"
 #include "server/mesh/scan/label_volume.h"
 #include "server/num/sort.h"
 #include "server/scene/subdivision_file.h"
@@ -515,4 +516,61 @@ pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene 
              options->shape ? "" : ": no scan was given");
     *out = loaded;
     return PAL_ERR_OK;
+}
+
+/* the voxels inside the surface as control cells */
+static pal_err fill_with_cells(const pal_surface *surface, int resolution, pal_loaded_scene *loaded,
+                               pal_diagnostic *diag)
+{
+    const pal_voxel_options options = {.resolution = resolution, .largest_only = true};
+    pal_voxels voxels;
+    pal_voxel_report report;
+    pal_cell_loops loops = {0};
+    PAL_TRY(pal_voxels_fill(surface, &options, &voxels, &report, diag));
+    const int *n = voxels.n;
+    const size_t row = (size_t)n[0] + 1, layer = row * ((size_t)n[1] + 1), n_corner = layer * ((size_t)n[2] + 1);
+    int32_t *vertex_at = malloc(n_corner * sizeof *vertex_at);
+    if (!vertex_at) loops.err = PAL_ERR_MEMORY;
+    if (vertex_at) memset(vertex_at, -1, n_corner * sizeof *vertex_at);
+    for (int at = 0; vertex_at && at < n[0] * n[1] * n[2]; at++) {
+        int32_t hex[8];
+        if (!voxels.kind[at]) continue;
+        for (int c = 0; c < 8; c++) {
+            const int i[3] = {at % n[0] + (c & 1), at / n[0] % n[1] + (c >> 1 & 1), at / n[0] / n[1] + (c >> 2)};
+            int32_t *vertex = &vertex_at[(size_t)i[2] * layer + (size_t)i[1] * row + (size_t)i[0]];
+            double x[3];
+            for (int a = 0; a < 3; a++) x[a] = voxels.low_m[a] + voxels.edge_m * i[a];
+            if (*vertex < 0) *vertex = pal_cell_loops_vertex(&loops, x, 0);
+            hex[c] = *vertex;
+        }
+        pal_cell_loops_hex(&loops, hex);
+    }
+    free(vertex_at);
+    pal_voxels_free(&voxels);
+    PAL_TRY(pal_cell_loops_finish(&loops, &loaded->cells[0], diag));
+    loaded->scene.body[0].cells = &loaded->cells[0];
+    return pal_subdivision_update_surface(loaded, 0, diag);
+}
+
+pal_err pal_scene_generated(const char *name, const pal_surface_scene *options, pal_loaded_scene **out,
+                            pal_diagnostic *diag)
+{
+    pal_generated_organ organ;
+    pal_surface_scene_report report;
+    pal_surface_scene all = *options;
+    PAL_TRY(pal_organ_generate(name, &organ, diag));
+    pal_loaded_scene *loaded = begin(&report, name, diag);
+    pal_err err = loaded ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    all.resolution = organ.resolution, all.hold = organ.hold, all.gravity = organ.gravity;
+    if (!(all.material.density_kg_m3 > 0)) all.material = (pal_material){0, 0.45, 1000, PAL_DAMPING_DERIVED, 1};
+    all.material.young_Pa = organ.young_Pa;
+    all.largest_only = true;
+    if (!err && all.cells) err = fill_with_cells(&organ.surface, (organ.resolution + 1) / 2, loaded, diag);
+    if (!err && !all.cells) err = make(name, &organ.surface, &all, &loaded->mesh[0], &report, diag);
+    if (!err && all.adaptive) err = pal_scene_adaptive_inspect(&loaded->mesh[0].surface, &all, &report, diag);
+    if (!err) err = make_body(loaded, name, &all, all.cells ? NULL : &report, diag);
+    if (!err && !all.cells) err = drop_loose(loaded, &all, &report, diag);
+    pal_surface_free(&organ.surface);
+    if (!err && organ.hangs) loaded->scene.gravity_m_s2 *= -1;
+    return finish(loaded, name, name, -1, err, out);
 }

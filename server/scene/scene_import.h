@@ -19,6 +19,11 @@ pal_err pal_scene_from_cells(const char *path, const pal_surface_scene *options,
  * anchors fixed in space, a sheet of 17 x 17 vertices and 0.2 m held at its border. REFUSED: there is no such shape */
 pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene **out, pal_surface_scene_report *report,
                              pal_diagnostic *diag);
+/* an organ of server/mesh/geometry/organ_family.h by its name FAMILY:SEED, which gives resolution, modulus, support and
+ * gravity; of options: fem with its element, law and solver, cells or adaptive, and damping. REFUSED: no such name, or
+ * cells that touch along an edge or in a corner only */
+pal_err pal_scene_generated(const char *name, const pal_surface_scene *options, pal_loaded_scene **out,
+                            pal_diagnostic *diag);
 /* other texts than those from the file's name; NULL keeps one. name becomes the only body's name as well. REFUSED for
  * characters that a scene may not hold or too many of them, and then nothing changed */
 pal_err pal_scene_rename(pal_loaded_scene *scene, const char *name, const char *title, const char *source,

@@ -64,6 +64,7 @@ static cJSON *body_json(const pal_scene *scene, int index)
 {
     const pal_body_def *body = &scene->body[index];
     const pal_material *m = &body->material;
+    const bool derived = m->damping_1_s == PAL_DAMPING_DERIVED;
     char name[MESH_NAME];
     cJSON *supports = cJSON_CreateArray(), *effects = cJSON_CreateArray(), *model = entry_json(&body->model);
     for (int k = 0; k < body->n_support; k++) cJSON_AddItemToArray(supports, support_json(&body->support[k]));
@@ -75,7 +76,8 @@ static cJSON *body_json(const pal_scene *scene, int index)
     PAL_JSON_ADD(object, {"material",
                           PAL_JSON({"young_Pa", pal_json_exact(m->young_Pa)}, {"poisson", pal_json_exact(m->poisson)},
                                    {"density_kg_m3", pal_json_exact(m->density_kg_m3)},
-                                   {"damping_1_s", pal_json_exact(m->damping_1_s)})});
+                                   {"damping_1_s", derived ? NULL : pal_json_exact(m->damping_1_s)},
+                                   {"damping_ratio", derived ? pal_json_exact(m->damping_ratio) : NULL})});
     stem_of(scene, index, name);
     pal_region_append(object, body, name);
     return PAL_JSON_ADD(object, {"model", model}, {"solver", body->solver.name[0] ? entry_json(&body->solver) : NULL},

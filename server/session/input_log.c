@@ -53,7 +53,10 @@ static const struct field {
     {FIELD(POSE, pose.velocity_m_s)},
     {FIELD(POSE, pose.buttons)},
     {FIELD(POSE, pose.seq)},
-    {FIELD(MATERIAL, material)},
+    {FIELD(MATERIAL, material.young_Pa)},
+    {FIELD(MATERIAL, material.poisson)},
+    {FIELD(MATERIAL, material.density_kg_m3)},
+    {FIELD(MATERIAL, material.damping_1_s)},
     {FIELD(BRUSH, slot)},
     {FIELD(BRUSH, brush.kind)},
     {FIELD(BRUSH, brush.at_m)},
@@ -71,8 +74,7 @@ static const struct field {
 #undef FIELD
 };
 enum { N_FIELD = sizeof fields / sizeof *fields };
-_Static_assert(sizeof(pal_brush_kind) == 4 && sizeof(int) == 4 && sizeof(pal_material) == 32 &&
-                   sizeof(pal_stroke) == 56,
+_Static_assert(sizeof(pal_brush_kind) == 4 && sizeof(int) == 4 && sizeof(pal_stroke) == 56,
                "members have the size of the log's numbers, and no padding");
 
 /* -1: no such kind */
@@ -128,6 +130,12 @@ static uint64_t mix_item(uint64_t h, const pal_config_entry *item)
     }
     return h;
 }
+static uint64_t mix_material(uint64_t h, const pal_material *m)
+{
+    double number[4] = {m->young_Pa, m->poisson, m->density_kg_m3, m->damping_1_s};
+    h = pal_hash_bytes(h, number, sizeof number);
+    return m->damping_1_s == PAL_DAMPING_DERIVED ? pal_hash_bytes(h, &m->damping_ratio, sizeof(double)) : h;
+}
 static uint64_t mix_mesh(uint64_t h, const pal_prepared *mesh)
 {
     if (!mesh) return h;
@@ -173,7 +181,7 @@ uint64_t pal_scene_fingerprint(const pal_scene *scene)
         const pal_body_def *def = &scene->body[b];
         h = mix_mesh(h, def->mesh);
         h = mix_cells(h, def);
-        h = pal_hash_bytes(h, &def->material, sizeof def->material);
+        h = mix_material(h, &def->material);
         h = mix_item(mix_item(mix_item(h, &def->model), &def->solver), &def->output);
         for (int k = 0; k < def->n_support; k++) {
             const pal_support_def *s = &def->support[k];

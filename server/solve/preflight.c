@@ -3,7 +3,6 @@
 #include "server/solve/preflight.h"
 
 #include "server/base/clock.h"
-#include "server/num/conjugate_gradient.h"
 #include "server/num/lanczos.h"
 #include "server/sim/implicit/system.h"
 #include "server/sim/implicit/tuning.h"
@@ -26,7 +25,6 @@ typedef struct probe {
     bool failed;
     uint64_t spent_ns; /* in the components, in n_run evaluations of all of them */
     int n_run;
-    int max_cg; /* iterations for each axis of the slowest motion */
 } probe;
 
 /* ---- weak spots ---- */
@@ -161,11 +159,6 @@ static bool over_mass(void *user, const double *b, double *out)
     return true;
 }
 
-static void precondition(void *user, const double *r, double *out)
-{
-    (void)over_mass(user, r, out);
-}
-
 static double find_fastest(probe *p, double *room)
 {
     const pal_body *body = p->body;
@@ -191,46 +184,18 @@ static double find_fastest(probe *p, double *room)
     return sqrt(l.ritz);
 }
 
-/* smallest Rayleigh quotient of the shapes under a weight along each axis */
-static double find_slowest(probe *p, double *room)
-{
-    const pal_body *body = p->body;
-    size_t n = 3 * (size_t)body->n_dof;
-    double min = INFINITY, *u = room, *b = room + n;
-    for (size_t axis = 0; axis < 3; axis++) {
-        pal_conjugate_gradient cg = {.n = (int)n,
-                                     .multiply = apply,
-                                     .precondition = precondition,
-                                     .user = p,
-                                     .r = room + 2 * n,
-                                     .z = room + 3 * n,
-                                     .p = room + 4 * n,
-                                     .q = room + 5 * n};
-        double uf = 0, uu = 0;
-        for (size_t i = 0; i < n; i++) {
-            u[i] = 0;
-            b[i] = cg.r[i] = i % 3 == axis && !body->support[i / 3] ? body->mass_kg[i / 3] : 0;
-        }
-        (void)pal_conjugate_gradient_run(&cg, u, 0.03 * sqrt(pal_dot_product((int)n, b, b)), 1, p->max_cg);
-        /* u'Ku = u'(b - r) */
-        for (size_t i = 0; i < n; i++) uf += u[i] * (b[i] - cg.r[i]), uu += body->mass_kg[i / 3] * u[i] * u[i];
-        if (uu > 0 && uf / uu < min) min = uf / uu;
-    }
-    return sqrt(min);
-}
-
 static bool find_modes(probe *p, pal_preflight_body *out)
 {
     pal_body *body = p->body;
     size_t n = 3 * (size_t)body->n_dof;
-    double *room = calloc(8 * n + 1, sizeof *room);
+    double *room = calloc(5 * n + 1, sizeof *room);
     if (!room) return false;
-    p->x = room + 6 * n, p->low = room + 7 * n;
+    p->x = room + 3 * n, p->low = room + 4 * n;
     p->step_m = PAL_DIFFERENCE_H * body->edge_m;
     memcpy(p->x, body->x, n * sizeof(double));
     out->omega_max_1_s = out->n_fixed < body->n_active ? find_fastest(p, room) : (double)NAN;
-    out->omega_min_1_s = out->n_fixed > 0 && out->n_fixed < body->n_active ? find_slowest(p, room) : (double)NAN;
-    /* anchors also restrain a body, but without fixed nodes omega_min and the condition stay unknown */
+    out->omega_min_1_s = body->lowest_1_s > 0 ? body->lowest_1_s : (double)NAN;
+    out->omega_min_error = body->lowest_error;
     out->condition = out->omega_max_1_s * out->omega_max_1_s / (out->omega_min_1_s * out->omega_min_1_s);
     out->slowest_period_s = 2 * M_PI / out->omega_min_1_s;
     memcpy(body->x, p->x, n * sizeof(double));
@@ -286,10 +251,11 @@ static void find_locking(const pal_body_def *def, pal_preflight_body *out)
 
 /* ---- whole scene ---- */
 
-static pal_err check_body(pal_world *world, const pal_scene *scene, int b, int max_cg, pal_preflight_body *out)
+static pal_err check_body(pal_world *world, const pal_scene *scene, int b, pal_preflight_body *out)
 {
     pal_body *body = pal_world_body(world, b);
-    probe p = {.world = world, .body = body, .max_cg = max_cg};
+    probe p = {.world = world, .body = body};
+    if (!(body->lowest_1_s > 0)) PAL_TRY(pal_world_find_lowest(world, b, NULL));
     for (int i = 0; i < pal_world_component_count(world); i++) {
         const pal_component *component = pal_world_component(world, i);
         pal_component_info info;
@@ -313,11 +279,13 @@ static pal_err check_body(pal_world *world, const pal_scene *scene, int b, int m
     check_masses(body, out);
     find_locking(&scene->body[b], out);
     if (!find_modes(&p, out)) return PAL_ERR_MEMORY;
+    out->return_s = body->lowest_1_s > 0 ? pal_body_return_s(body) : (double)NAN;
+    (void)pal_preflight_slow(body, out->slow);
     out->predicted_ms = predict_ms(&p, body, out->n_sub, b);
     return PAL_ERR_OK;
 }
 
-pal_err pal_preflight_run(const pal_scene *scene, int max_cg, pal_preflight *out, pal_diagnostic *diag)
+pal_err pal_preflight_run(const pal_scene *scene, pal_preflight *out, pal_diagnostic *diag)
 {
     pal_world *world = NULL;
     *out = (pal_preflight){.n_body = scene->n_body};
@@ -325,7 +293,7 @@ pal_err pal_preflight_run(const pal_scene *scene, int max_cg, pal_preflight *out
     out->n_byte = pal_world_bytes(world);
     pal_err err = PAL_ERR_OK;
     for (int b = 0; b < scene->n_body && !err; b++) {
-        err = check_body(world, scene, b, max_cg, &out->body[b]);
+        err = check_body(world, scene, b, &out->body[b]);
         out->predicted_ms += out->body[b].predicted_ms;
     }
     pal_world_destroy(world);
@@ -333,6 +301,19 @@ pal_err pal_preflight_run(const pal_scene *scene, int max_cg, pal_preflight *out
 }
 
 /* ---- sentences ---- */
+
+bool pal_preflight_slow(const pal_body *body, char line[PAL_PREFLIGHT_LINE])
+{
+    const double return_s = pal_body_return_s(body);
+    line[0] = 0;
+    if (!(return_s > PAL_SLOW_RETURN_S)) return false;
+    snprintf(line, PAL_PREFLIGHT_LINE,
+             "it returns to rest slowly: a displacement falls to about a third in %.3g s (lowest frequency %.3g 1/s, "
+             "drag %.3g "
+             "1/s); stiffer material or more support is faster",
+             return_s, body->lowest_1_s, body->damping_1_s);
+    return true;
+}
 
 static void report_weak(const pal_weak_spot *w, const char *what, double scale, const char *unit, int *n,
                         char line[PAL_PREFLIGHT_LINES][PAL_PREFLIGHT_LINE])
@@ -366,10 +347,20 @@ int pal_preflight_describe(const pal_preflight_body *b, char line[PAL_PREFLIGHT_
     report_weak(&b->thin, "elements are hardly filled", 100, " %", &n, line);
     report_weak(&b->light, "nodes are very light", 1e3, " g", &n, line);
     if (isfinite(b->condition))
-        snprintf(line[n++], PAL_PREFLIGHT_LINE, "condition %.2g: its slowest motion takes %.3g s, its fastest %.3g ms",
-                 b->condition, b->slowest_period_s, 2e3 * M_PI / b->omega_max_1_s);
+        snprintf(
+            line[n++], PAL_PREFLIGHT_LINE,
+            "condition %.2g: its slowest motion takes %.3g s (to %.1g %%), its fastest %.3g ms; a displacement falls "
+            "to about a third in %.3g s",
+            b->condition, b->slowest_period_s, fmax(100 * b->omega_min_error, 0.1), 2e3 * M_PI / b->omega_max_1_s,
+            b->return_s);
     else if (isfinite(b->omega_max_1_s) && b->n_fixed == 0)
         snprintf(line[n++], PAL_PREFLIGHT_LINE, "no support holds it; its fastest motion takes %.3g ms",
                  2e3 * M_PI / b->omega_max_1_s);
+    else if (isfinite(b->omega_max_1_s) && b->n_fixed > 0)
+        snprintf(
+            line[n++], PAL_PREFLIGHT_LINE,
+            "its slowest motion is not known: part of it is not held, or it is too large; its fastest takes %.3g ms",
+            2e3 * M_PI / b->omega_max_1_s);
+    if (b->slow[0]) snprintf(line[n++], PAL_PREFLIGHT_LINE, "%s", b->slow);
     return n;
 }

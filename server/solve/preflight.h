@@ -1,10 +1,12 @@
 /* Checks a scene before it runs: the stable sub-step and the node that limits it, weak elements and nodes with
  * their positions, conditioning, memory, and the predicted cost of a step. A scene that cannot run is refused with
- * the reason of pal_world_create. Uses a world of its own, at rest. Takes some hundred force evaluations, most of
- * them for the slowest motion. Thread: [load]. */
+ * the reason of pal_world_create. Uses a world of its own, at rest. Takes some
+ * hundred force evaluations. Thread: [load]. */
 #ifndef PAL_SOLVE_PREFLIGHT_H
 #define PAL_SOLVE_PREFLIGHT_H
 #include "server/sim/world/world.h"
+
+enum { PAL_PREFLIGHT_LINE = 220, PAL_PREFLIGHT_LINES = 9 };
 
 /* the worst of a kind, and their number; positions in the scene frame */
 typedef struct pal_weak_spot {
@@ -29,10 +31,12 @@ typedef struct pal_preflight_body {
     pal_weak_spot edge;  /* edges shorter than 1e-6 S; value: m */
     pal_weak_spot thin;  /* elements filled by less than 5 %; value: share */
     pal_weak_spot light; /* points lighter than 1/1000 of the mean; value: kg */
-    /* Of M^-1 K at rest: the largest eigenvalue by Lanczos iteration; an upper bound of the smallest by the
-     * Rayleigh quotient of the body under its own weight. condition is their ratio, slowest_period_s the period of
-     * the smallest. NaN: no node is fixed, or all are. */
-    double omega_max_1_s, omega_min_1_s, condition, slowest_period_s;
+    /* Of M^-1 K at rest: the square root of the largest eigenvalue by Lanczos iteration, and of the smallest
+     * (implicit/lowest_frequency.h) with its relative error. condition is the ratio of the eigenvalues,
+     * slowest_period_s the period of the smallest, return_s the time constant of its decay. NaN: all points are fixed,
+     * or the smallest is not known, as where part of the body is not held */
+    double omega_max_1_s, omega_min_1_s, omega_min_error, condition, slowest_period_s, return_s;
+    char slow[PAL_PREFLIGHT_LINE]; /* the sentence of pal_preflight_slow; "": none */
     /* element that locks at the body's largest Poisson's ratio, and one that does not (both literals); NULL: none
      * locks */
     const char *locks, *instead;
@@ -48,12 +52,11 @@ typedef struct pal_preflight {
     size_t n_byte;       /* size of the world */
 } pal_preflight;
 
-/* max_cg: conjugate gradient iterations for the slowest motion, along each axis. With few of them omega_min_1_s is
- * too large and condition is a lower bound. Errors: REFUSED, BUDGET, MEMORY as pal_world_create. */
-enum { PAL_PREFLIGHT_FULL = 250, PAL_PREFLIGHT_QUICK = 40 };
-pal_err pal_preflight_run(const pal_scene *scene, int max_cg, pal_preflight *out, pal_diagnostic *diag);
+/* Errors: REFUSED, BUDGET, MEMORY as pal_world_create. */
+pal_err pal_preflight_run(const pal_scene *scene, pal_preflight *out, pal_diagnostic *diag);
 /* Sentences about one body, one per line, worst first. Returns the number of lines. Without weak spots: the limit
  * and conditioning only. */
-enum { PAL_PREFLIGHT_LINE = 200, PAL_PREFLIGHT_LINES = 8 };
 int pal_preflight_describe(const pal_preflight_body *body, char line[PAL_PREFLIGHT_LINES][PAL_PREFLIGHT_LINE]);
+/* true: the time constant of the body's return is above PAL_SLOW_RETURN_S, and line says so in one sentence; else "" */
+bool pal_preflight_slow(const pal_body *body, char line[PAL_PREFLIGHT_LINE]);
 #endif

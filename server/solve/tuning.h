@@ -11,6 +11,9 @@
 /* Poisson's ratio above which full integration locks; with less it is within some percent (tests/stability, case
  * poisson_static) */
 #define PAL_LOCKING_POISSON 0.47
+/* s: time constant of a body's return above which it is said to be slow: longer than a user waits for tissue to come
+ * back (tests/solve/test_preflight.c) */
+#define PAL_SLOW_RETURN_S 10
 /* fill below which cut voxels are dropped, and the volume that may be lost by it; fill otherwise (load_case.c gives
  * the measurements; tests/solve/test_solve.c) */
 #define PAL_DROP_FILL   0.25

@@ -30,7 +30,8 @@ static const char *failed(pal_study_job *job, const pal_configuration *configura
         pal_robustness_options o;
         pal_robustness_default(&o);
         o.only = name[k], o.max_cpu_s = PAL_CASE_CPU_S, o.progress = keeps_on, o.user = job;
-        if (!pal_robustness_run(&set->scene, &o, report, &reason) && report->n_failed > 0 && !report->result[0].frozen)
+        if (!pal_robustness_run(&set->scene, &o, report, &reason) && report->count[PAL_VERDICT_FAILED] > 0 &&
+            !report->result[0].frozen)
             found = name[k];
     }
     pal_configured_scene_free(set);

@@ -139,7 +139,8 @@ const char *pal_study_shape(const pal_body_def *body, char out[PAL_STUDY_SHAPE])
 {
     uint64_t sum = PAL_HASH_START;
     const pal_material *m = &body->material;
-    const double own[] = {m->young_Pa,    m->poisson,      m->density_kg_m3, m->damping_1_s,
+    /* a damping that is derived counts as its cap: it changes neither rest nor cost */
+    const double own[] = {m->young_Pa,    m->poisson,      m->density_kg_m3, pal_material_damping_1_s(m, 0),
                           body->n_region, body->n_support, body->n_stroke};
     const pal_surface *s = &body->mesh->surface;
     sum = pal_study_digest_numbers(sum, own, sizeof own / sizeof *own);

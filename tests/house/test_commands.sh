@@ -59,6 +59,18 @@ for bad_number in "--young-Pa 1.001e15" "--young-Pa 0.999e-6" "--poisson -0.9999
 done
 end
 
+begin "prepare says when a body returns slowly, and plan how fast it returns"
+run prepare box.obj -o soft --no-tetgen --units mm --young-Pa 0.001
+check "exit code $code" code_is 0
+check "it is not said" has out "returns to rest slowly"
+run plan soft --json
+check "no lowest frequency" has out '"lowest_1_s":[[:space:]]*0'
+check "no time of return" has out '"return_s":[[:space:]]*[1-9]'
+run prepare box.obj -o stiff --no-tetgen --units mm --damping-ratio 0.5
+check "a fast body is called slow" hasnt out "returns to rest slowly"
+check "the ratio is not written" has stiff/scene.json '"damping_ratio":[[:space:]]*0.5'
+end
+
 begin "prepare --json has every figure and is one object"
 run prepare box.obj -o scene2 --json --resolution 12 --units mm
 check "exit code $code" code_is 0

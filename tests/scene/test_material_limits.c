@@ -58,7 +58,7 @@ static bool is_region_key(int k, double value)
 
 static bool is_region(int k, double value)
 {
-    pal_material m = {NAN, NAN, NAN, 0};
+    pal_material m = {NAN, NAN, NAN, 0, 0};
     *number_of(&m, k) = value;
     pal_body_def *def = &plain.body[0];
     def->region[0] = (pal_region){.kind = PAL_REGION_BOX,
@@ -105,6 +105,21 @@ static void every_way_in_has_the_same_range(void)
     pal_world_destroy(world);
 }
 
+/* the ratio from which a damping is derived: 0 to a thousand */
+static void the_damping_ratio_has_one_range(void)
+{
+    static const char *const key =
+        "{\"bodies\": [{\"mesh\": \"ball.palmesh\", \"model\": {\"name\": \"fem\"}, \"material\": {\"%s\": %.17g}}]}";
+    CHECK(is_parsed(key, "damping_ratio", 0) && is_parsed(key, "damping_ratio", PAL_DAMPING_RATIO_MAX));
+    CHECK(!is_parsed(key, "damping_ratio", -1e-9) && !is_parsed(key, "damping_ratio", 1.001 * PAL_DAMPING_RATIO_MAX));
+    /* the number that stands for a derived damping is none that a scene may give */
+    CHECK(!is_parsed(key, "damping_1_s", PAL_DAMPING_DERIVED));
+    pal_material m = {5000, 0.4, 1000, PAL_DAMPING_DERIVED, PAL_DAMPING_RATIO_MAX};
+    CHECK_INT(pal_material_check(&m, NULL), 0);
+    m.damping_ratio = NAN;
+    CHECK_INT(pal_material_check(&m, NULL), PAL_ERR_REFUSED);
+}
+
 int main(void)
 {
     char path[300];
@@ -113,6 +128,7 @@ int main(void)
     snprintf(path, sizeof path, "%s/ball.palmesh", folder);
     if (pal_prepared_save(&mesh, path, &diag)) return 1;
     RUN(every_way_in_has_the_same_range);
+    RUN(the_damping_ratio_has_one_range);
     pal_prepared_free(&mesh);
     char command[400];
     snprintf(command, sizeof command, "rm -rf %s", folder);

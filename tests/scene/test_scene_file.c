@@ -237,6 +237,8 @@ static void absent_keys_take_the_defaults(void)
     CHECK_TEXT(got->tool[2].name, "probe 3");
     CHECK_TEXT(got->body[0].name, "body 1");
     CHECK_NEAR(got->body[0].material.young_Pa, 5000, 0);
+    CHECK_NEAR(got->body[0].material.damping_1_s, PAL_DAMPING_DERIVED, 0);
+    CHECK_NEAR(got->body[0].material.damping_ratio, 1, 0);
     CHECK_INT(got->body[0].n_effect, body.n_effect);
     CHECK_TEXT(got->body[0].effect[1].path, "bodies[0].effects[1]");
     CHECK_INT(got->body[0].n_support, 1);
@@ -320,7 +322,7 @@ static void a_saved_scene_loads_to_the_same_world_step_by_step(void)
     pal_diagnostic diag = {""};
     REQUIRE(in != NULL);
     in->scene = plain;
-    in->scene.body[0].material = (pal_material){6543.21, 0.41, 1030, 3};
+    in->scene.body[0].material = (pal_material){6543.21, 0.41, 1030, 3, 0};
     in->scene.tool[0].radius_m = 0.1 / 3;
     pal_entry_put_number(&in->scene.body[0].model, "k_distance_J", 0.1 / 7, NULL);
     in->scene.body[0].n_support = 2;
@@ -336,6 +338,19 @@ static void a_saved_scene_loads_to_the_same_world_step_by_step(void)
     CHECK(before != 0);
     CHECK(hash_after(&out->scene, CHECK_REPEATS(100, 20)) == before);
     CHECK_TEXT(out->scene.title, in->scene.title);
+    CHECK_NEAR(out->scene.body[0].material.damping_1_s, 3, 0);
+    /* a damping that is derived stays one */
+    pal_scene_free(out);
+    in->scene.body[0].material.damping_1_s = PAL_DAMPING_DERIVED, in->scene.body[0].material.damping_ratio = 1.0 / 3;
+    snprintf(where, sizeof where, "%s/a/b/derived", folder);
+    CHECK_INT(pal_scene_save(in, where, &diag), 0);
+    snprintf(where, sizeof where, "%s/a/b/derived/scene.json", folder);
+    REQUIRE(!pal_scene_load(where, &out, &diag));
+    CHECK_NEAR(out->scene.body[0].material.damping_1_s, PAL_DAMPING_DERIVED, 0);
+    CHECK_NEAR(out->scene.body[0].material.damping_ratio, 1.0 / 3, 0);
+    pal_scene_free(out);
+    snprintf(where, sizeof where, "%s/a/b/saved/scene.json", folder);
+    REQUIRE(!pal_scene_load(where, &out, &diag));
     /* and the hash does depend on what was saved */
     out->scene.body[0].material.young_Pa *= 1.0001;
     CHECK(hash_after(&out->scene, CHECK_REPEATS(100, 20)) != before);
@@ -499,7 +514,7 @@ static void a_bare_surface_becomes_a_scene_of_about_13000_tets(void)
     pal_scene_free(loaded);
     options.unit_m = 1;
     options.resolution = 10;
-    options.material = (pal_material){1e6, 0.3, 1200, 1};
+    options.material = (pal_material){1e6, 0.3, 1200, 1, 0};
     REQUIRE(!pal_scene_from_surface(in_folder("Ball \xc3\xa9\x01 7.obj"), &options, &loaded, &report, &diag));
     CHECK_NEAR(report.prepare.voxel.surface_volume_m3, 4.0 / 3 * M_PI * 1.25e5, 4e3);
     CHECK(!report.unit_guessed);

@@ -219,7 +219,7 @@ static void bad_poses_and_commands_are_refused_and_counted(void)
     material.body = 0;
     material.material.young_Pa = NAN;
     CHECK_INT(pal_session_command(s, &material), PAL_ERR_REFUSED);
-    material.material = (pal_material){5000, 0.6, 1000, 4};
+    material.material = (pal_material){5000, 0.6, 1000, 4, 0};
     CHECK_INT(pal_session_command(s, &material), PAL_ERR_REFUSED);
     CHECK_INT(stepped_steps(s, 1)->n_refused, 10);
     pal_session_close(s);

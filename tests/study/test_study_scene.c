@@ -75,8 +75,8 @@ static void check_survives(const organ *o, const pal_configuration *configuratio
         pal_robustness_default(&options);
         options.only = name[k], options.max_cpu_s = 2;
         CHECK(!pal_robustness_run(&set->scene, &options, r, &diag));
-        CHECK_INT(r->n_failed, 0);
-        if (r->n_failed) printf("  %s: %s\n", name[k], r->result[0].diag);
+        CHECK_INT(r->count[PAL_VERDICT_FAILED], 0);
+        if (r->count[PAL_VERDICT_FAILED]) printf("  %s: %s\n", name[k], r->result[0].diag);
     }
     pal_configured_scene_free(set);
     free(r);

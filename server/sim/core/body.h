@@ -136,6 +136,11 @@ typedef struct pal_body {
     double load_cap_N; /* largest load on a node (pal_body_load_cap_N); larger ones are shortened               */
     double stiffening_damping_1_s, stiffening_damping_s; /* extra drag and its remaining time (stiffening_damper.h)   */
 
+    /* ---- motion near rest ---- */
+    double lowest_1_s;   /* lowest angular frequency of the supported body at rest, 1/s; 0: not known              */
+    double lowest_error; /* relative, of lowest_1_s, by which it may be too high                                  */
+    double damping_1_s;  /* drag over mass that acts, 1/s                                                          */
+
     /* ---- state and safeguards ---- */
     bool frozen;                  /* stopped (pal_body_stop): it no longer moves                                    */
     bool asleep;                  /* at rest: no component runs until something comes near (component sleep)        */
@@ -174,6 +179,15 @@ static inline double pal_body_inverse_mass_1_kg(const pal_body *body, int node)
 {
     if (body->node_inverse_mass_1_kg) return body->node_inverse_mass_1_kg[node];
     return body->support[node] ? 0 : 1 / body->mass_kg[node];
+}
+
+/* time constant of the slowest mode of a body near rest, s: the larger of c / w1^2, which holds above critical damping
+ * (c > 2 w1), and 1 / w1; 0: lowest_1_s is not known */
+static inline double pal_body_return_s(const pal_body *body)
+{
+    if (!(body->lowest_1_s > 0)) return 0;
+    const double creep_s = body->damping_1_s / (body->lowest_1_s * body->lowest_1_s), inverse_s = 1 / body->lowest_1_s;
+    return creep_s > inverse_s ? creep_s : inverse_s;
 }
 
 /* arrays for n_node dofs without interpolation, all active, zeroed; MEMORY. [load] */

@@ -24,7 +24,11 @@ void pal_body_default(pal_body_def *body, const char *name, const pal_prepared *
     memset(body, 0, sizeof *body);
     snprintf(body->name, sizeof body->name, "%s", name);
     body->mesh = mesh;
-    body->material = (pal_material){.young_Pa = 5000, .poisson = 0.45, .density_kg_m3 = 1000, .damping_1_s = 4};
+    body->material = (pal_material){.young_Pa = 5000,
+                                    .poisson = 0.45,
+                                    .density_kg_m3 = 1000,
+                                    .damping_1_s = PAL_DAMPING_DERIVED,
+                                    .damping_ratio = 1};
     pal_entry_init(&body->model, "model", "tet_springs");
     pal_entry_init(&body->solver, "solver", "");
     pal_entry_init(&body->output, "output", "skin_output");
@@ -58,13 +62,15 @@ void pal_tools_default(pal_scene *scene, int n_tool)
 
 pal_err pal_material_check(pal_material *material, pal_diagnostic *diag)
 {
+    const bool derived = material->damping_1_s == PAL_DAMPING_DERIVED;
     const struct {
         const char *key;
         double value, low, high;
     } range[] = {{"young_Pa", material->young_Pa, PAL_YOUNG_MIN_PA, PAL_YOUNG_MAX_PA},
                  {"poisson", material->poisson, PAL_POISSON_MIN, PAL_POISSON_MAX},
                  {"density_kg_m3", material->density_kg_m3, PAL_DENSITY_MIN_KG_M3, PAL_DENSITY_MAX_KG_M3},
-                 {"damping_1_s", material->damping_1_s, 0, PAL_NUMBER_MAX}};
+                 {"damping_1_s", derived ? 0 : material->damping_1_s, 0, PAL_NUMBER_MAX},
+                 {"damping_ratio", material->damping_ratio, 0, PAL_DAMPING_RATIO_MAX}};
     for (size_t i = 0; i < sizeof range / sizeof range[0]; i++)
         if (!(range[i].value >= range[i].low && range[i].value <= range[i].high))
             return PAL_REFUSE(diag, "material.%s: %g is outside [%g, %g]", range[i].key, range[i].value, range[i].low,

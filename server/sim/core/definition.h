@@ -16,8 +16,12 @@ typedef struct pal_material {
     double young_Pa;      /* 5000           */
     double poisson;       /* 0.45; above PAL_POISSON_CLAMP it is taken as that */
     double density_kg_m3; /* 1000           */
-    double damping_1_s;   /* 4: viscous damping rate c/m of the effect `viscous`; 0: no such component */
+    /* viscous damping rate c/m of the effect `viscous`; 0: no such component; PAL_DAMPING_DERIVED (the default): from
+     * the body's lowest frequency w1, see pal_material_damping_1_s */
+    double damping_1_s;
+    double damping_ratio; /* 1: of a derived rate, over the critical damping 2 w1 of the slowest mode */
 } pal_material;
+#define PAL_DAMPING_DERIVED (-1.0)
 
 /* another material in a part of the body; the last region that contains a point wins. Numbers that are NaN keep the
  * body's */
@@ -131,6 +135,14 @@ pal_err pal_support_read(pal_config_entry *entry, pal_support_def *out, pal_diag
 bool pal_support_of_effect(const pal_config_entry *effect, pal_support_def *out);
 /* fixed [n] = 1 for all points that the body's supports, rims excepted, and its effects support */
 void pal_body_def_mark_fixed(const pal_body_def *def, const double up[3], const double *x, int n, uint8_t *fixed);
+/* The rate that is given, or the derived one: min(4, 2 ratio w1). At ratio 1 the slowest mode returns as fast as it
+ * can, with the time constant 1 / w1. lowest_1_s 0: w1 is not known, and the rate is 4 */
+static inline double pal_material_damping_1_s(const pal_material *material, double lowest_1_s)
+{
+    const double critical = 2 * material->damping_ratio * lowest_1_s;
+    if (material->damping_1_s != PAL_DAMPING_DERIVED) return material->damping_1_s;
+    return lowest_1_s > 0 && critical < PAL_DAMPING_1_S ? critical : PAL_DAMPING_1_S;
+}
 /* REFUSED names the key of a number that is not finite or out of range (tuning.h). A Poisson ratio above
  * PAL_POISSON_CLAMP is taken as that, and diag reports it */
 pal_err pal_material_check(pal_material *material, pal_diagnostic *diag);

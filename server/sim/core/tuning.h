@@ -24,6 +24,11 @@
 /* m, 1/s: positions and radii, of which a body of this size in mm as a file's unit is still one
  * (tests/scene/test_scene_file.c); drag c/m, whose decay no sub-step resolves (tests/scene/test_material_limits.c) */
 #define PAL_NUMBER_MAX 1e9
+/* 1/s: the largest rate that is derived from the lowest frequency. Soft tissue comes to rest within a second with it;
+ * bodies with w1 above 2 1/s have it (tests/sim/plan/test_damping.c) */
+#define PAL_DAMPING_1_S 4.0
+/* largest damping ratio of mode 1: the cap holds long before (tests/scene/test_material_limits.c) */
+#define PAL_DAMPING_RATIO_MAX 1e3
 /* factors of a paint stroke, up or down (tests/scene/test_subdivision_scene.c) */
 #define PAL_STROKE_FACTOR_MAX 1e6
 /* nodes of a grid of spring constants */

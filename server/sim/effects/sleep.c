@@ -4,6 +4,12 @@
  * were unchanged, no tool was near, no component's force changed with time and refinement had nothing left to do; and
  * the residual forces would then move the body by less than rest_1_s2 S in s^2, as a mass-weighted mean (S: the body's
  * box diagonal). Speed alone is not enough: a body that creeps against a large drag is slow but not at rest.
+ *
+ * A motion that decays with the time constant tau is speed * tau away from rest, and a force moves a body of the lowest
+ * frequency w1 by at most force / (mass w1^2). So that what sleep freezes is at most PAL_SLEEP_ERROR_S, both limits are
+ * lowered for a slow body: the speed to PAL_SLEEP_ERROR_S S / tau with tau = pal_body_return_s, the residual to
+ * PAL_SLEEP_ERROR_S w1^2 S.
+ *
  * Velocities are then 0, positions stay the same to the bit, and none of the body's components runs. CONTACT components
  * forget their tool state, as after a reset.
  *
@@ -16,6 +22,7 @@
  * Keys: rest_time_s (0.5), speed_1_s (1e-4), rest_1_s2 (1e-4). */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect.h"
+#include "server/sim/effects/tuning.h"
 
 typedef struct sleeper {
     double rest_time_s, speed_1_s, rest_1_s2;
@@ -41,7 +48,9 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 /* true: no point moves; a non-finite speed is not slow */
 static bool slow(const sleeper *row, const pal_body *body)
 {
-    double max = row->speed_1_s * body->length_scale_m, max2 = max * max;
+    const double return_s = pal_body_return_s(body);
+    const double speed_1_s = return_s > 0 ? fmin(row->speed_1_s, PAL_SLEEP_ERROR_S / return_s) : row->speed_1_s;
+    double max = speed_1_s * body->length_scale_m, max2 = max * max;
     bool all = true;
     for (int k = 0; k < body->n_active; k++) {
         const double *v = body->v + 3 * (size_t)pal_body_point(body, k);
@@ -147,7 +156,9 @@ static bool balanced(const sleeper *row, pal_step *step)
         mass += body->mass_kg[i];
         if (!body->support[i]) force += pal_norm3(body->g + 3 * (size_t)i);
     }
-    return force <= row->rest_1_s2 * body->length_scale_m * mass;
+    const double slow_1_s2 = PAL_SLEEP_ERROR_S * body->lowest_1_s * body->lowest_1_s;
+    const double rest_1_s2 = body->lowest_1_s > 0 ? fmin(row->rest_1_s2, slow_1_s2) : row->rest_1_s2;
+    return force <= rest_1_s2 * body->length_scale_m * mass;
 }
 
 static void fall_asleep(pal_step *step)

@@ -6,6 +6,9 @@
 /* loaded area over a triangle's area at rest at most: a load that grows with the area it inflates has no equilibrium
  * from about E/3 on (test_brush) */
 #define MAX_AREA 2
+/* S: distance from rest at which sleep may freeze a body, a tenth of what robustness trials allow a body that has
+ * returned (tests/sim/effects/test_return.c) */
+#define PAL_SLEEP_ERROR_S 1e-4
 
 /* ---- refine (test_refine) ---- */
 

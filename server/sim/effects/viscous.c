@@ -1,5 +1,5 @@
 /* Component viscous: f = -k_damp v with k_damp = rate m, the drag of paper B section 4.1. Key: rate_1_s (the
- * material's damping_1_s).
+ * material's damping_1_s, given or derived).
  *
  * Departure: the paper applies it explicitly; a solver that knows the hook `drag` divides by 1 + dt rate instead,
  * which is stable for every rate. */
@@ -14,7 +14,8 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     viscous *row = PAL_NEW(build->arena, viscous, 1);
     if (!row) return PAL_ERR_MEMORY;
-    *row = (viscous){.rate_1_s = build->def->material.damping_1_s, .given = pal_entry_has(item, "rate_1_s")};
+    *row = (viscous){.rate_1_s = pal_material_damping_1_s(&build->def->material, build->body->lowest_1_s),
+                     .given = pal_entry_has(item, "rate_1_s")};
     *self = row;
     PAL_TRY(pal_entry_read_number(item, "rate_1_s", 0, 1e9, &row->rate_1_s, build->diag));
     return pal_entry_check_unused(item, build->diag);
@@ -49,8 +50,8 @@ static void damping(void *self, const pal_body *body, double *bound_Ns_m)
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
 {
     viscous *row = self;
-    (void)body, (void)diag;
-    if (!row->given) row->rate_1_s = to->damping_1_s;
+    (void)diag;
+    if (!row->given) row->rate_1_s = pal_material_damping_1_s(to, body->lowest_1_s);
     return PAL_ERR_OK;
 }
 

@@ -133,7 +133,7 @@ static int choose_groups(const pal_body *body, const near_list *near, int32_t *g
     return n_group;
 }
 
-static pal_err make_groups(pal_interpolated_system *e, const pal_body *body, pal_arena *arena)
+pal_err pal_interpolated_system_group(pal_interpolated_system *e, const pal_body *body, pal_arena *arena)
 {
     int n = body->n_dof;
     near_list near = {0};
@@ -190,7 +190,7 @@ pal_err pal_interpolated_system_make(const pal_body *body, const pal_component *
     free_cliques(&cliques);
     PAL_TRY(err);
     PAL_TRY(make_arrays(e, body, arena));
-    PAL_TRY(make_groups(e, body, arena));
+    PAL_TRY(pal_interpolated_system_group(e, body, arena));
     PAL_TRY(check_work(body, e->n_group, diag));
     e->n_move = 3 * e->n_group;
     *out = e;

@@ -28,6 +28,9 @@ typedef struct pal_interpolated_system {
  * both, or else everywhere. BUDGET: probes times nodes exceed 2e7, about ten seconds' work; MEMORY. [load] */
 pal_err pal_interpolated_system_make(const pal_body *body, const pal_component *force, int n_force, pal_arena *arena,
                                      pal_diagnostic *diag, pal_interpolated_system **out);
+/* n_group, start and point from the pattern `rest`: points of a group have no common neighbour, so that one move finds
+ * their columns. Also for bodies whose nodes are dofs. MEMORY. [load] */
+pal_err pal_interpolated_system_group(pal_interpolated_system *e, const pal_body *body, pal_arena *arena);
 /* marks the matrix out of date: the components have another material */
 static inline void pal_interpolated_system_invalidate(pal_interpolated_system *interpolated)
 {

@@ -27,10 +27,27 @@
  * takes effect is its operations over this (tests/sim/solvers/test_solve_report.c) */
 #define PAL_REFRESH_FLOPS 1e9
 
+/* estimated relative error of the square of a body's lowest frequency at which the search ends; measured errors of the
+ * frequency are below 1 %, but for two modes less than 3 % apart, of the 5 % that damping, sleep and reports need. Of
+ * diagonal over mass, the shift that makes a singular stiffness definite, and the square of a frequency below which a
+ * body counts as not held: a slender body has 1e-7, rounding of differences of forces 1e-11
+ * (tests/sim/implicit/test_lowest_frequency.c) */
+#define PAL_FREQUENCY_TOLERANCE 5e-3
+#define PAL_FREQUENCY_SHIFT     1e-12
+#define PAL_FREQUENCY_ZERO      1e-10
+/* forces of a node that the search may evaluate to find a stiffness without tangents: about a second
+ * (tests/sim/implicit/test_lowest_frequency.c) */
+#define PAL_FREQUENCY_WORK_MAX 2e7
+/* edge of a rigid part in distances of points: 150 to 850 parts on bodies of 2,600 to 17,000 points, whose factor is a
+ * tenth of the work (tests/sim/implicit/test_lowest_frequency.c) */
+#define PAL_FREQUENCY_PART 3
+
 enum {
     /* products with all nodes, times nodes, that finding an interpolated matrix may take at load: ten seconds of 500
      * operations for a node (tests/sim/implicit/test_interpolated_implicit.c) */
     PAL_PROBE_WORK_MAX = 20000000,
+    /* iterations of the search at most: several times what bodies with loose border elements take */
+    PAL_FREQUENCY_ITERATIONS = 300,
     /* columns of an interpolated matrix found again in a simulated second after an edit, each the work of one product:
      * a few in a step */
     PAL_PROBES_1_S = 240,

@@ -133,7 +133,7 @@ static pal_err list(pal_config_entry *item, pal_build *build, pal_component_list
         if (k.frame) PAL_TRY(pal_entry_put_text(row, "frame", k.frame, build->diag));
         row++;
     }
-    if (def->material.damping_1_s > 0) pal_entry_init(row++, item->path, "viscous");
+    if (def->material.damping_1_s != 0) pal_entry_init(row++, item->path, "viscous");
     if (k.refine && k.adaptive.n_level > 1) pal_entry_init(row++, item->path, "refine");
     if (!def->solver.name[0]) pal_entry_init(row++, item->path, "rk4");
     out->n_row = (int)(row - out->row);

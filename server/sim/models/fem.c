@@ -56,7 +56,7 @@ static pal_err list(pal_config_entry *item, pal_build *build, pal_component_list
     PAL_TRY(pal_entry_put_bool(row, "fill", k.fill, build->diag));
     const bool own_law = k.law && !strcmp(k.law, "neo_hookean") && !strcmp(build->def->solver.name, "static_newton");
     if (own_law) PAL_TRY(pal_entry_put_bool(row, "recover", false, build->diag));
-    if (build->def->material.damping_1_s > 0) pal_entry_init(++row, item->path, "viscous");
+    if (build->def->material.damping_1_s != 0) pal_entry_init(++row, item->path, "viscous");
     if (!build->def->solver.name[0]) pal_entry_init(++row, item->path, "implicit_euler");
     out->n_row = (int)(row - out->row) + 1;
     return PAL_ERR_OK;

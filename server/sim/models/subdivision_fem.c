@@ -145,7 +145,7 @@ static pal_err list(pal_config_entry *item, pal_build *build, pal_component_list
     pal_entry_init(row, item->path, "cell_elastic");
     if (k.operator) PAL_TRY(pal_entry_put_text(row, "operator", k.operator, build->diag));
     row++;
-    if (build->def->material.damping_1_s > 0) pal_entry_init(row++, item->path, "viscous");
+    if (build->def->material.damping_1_s != 0) pal_entry_init(row++, item->path, "viscous");
     if (!build->def->solver.name[0]) pal_entry_init(row++, item->path, "central_cg");
     out->n_row = (int)(row - out->row);
     return PAL_ERR_OK;

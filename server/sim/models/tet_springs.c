@@ -98,7 +98,7 @@ static pal_err list(pal_config_entry *item, pal_build *build, pal_component_list
     out->n_row = 0;
     for (int kind = PAL_SPRING_DISTANCE; kind <= PAL_SPRING_VOLUME; kind++)
         PAL_TRY(add_spring(item, (pal_spring_kind)kind, &build->def->spring_grid, out, build->diag));
-    if (build->def->material.damping_1_s > 0) pal_entry_init(&out->row[out->n_row++], item->path, "viscous");
+    if (build->def->material.damping_1_s != 0) pal_entry_init(&out->row[out->n_row++], item->path, "viscous");
     if (!build->def->solver.name[0]) pal_entry_init(&out->row[out->n_row++], item->path, "verlet");
     return PAL_ERR_OK;
 }

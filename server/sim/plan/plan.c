@@ -3,6 +3,8 @@
 
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
+#include "server/sim/core/step_guard.h"
+#include "server/sim/implicit/lowest_frequency.h"
 #include "server/sim/plan/plan_requests.h"
 
 #include <stdlib.h>
@@ -76,6 +78,30 @@ static pal_err explain(const pal_plan_requests *s, pal_component *list, int n_co
     return PAL_ERR_OK;
 }
 
+/* The lowest frequency of a body that moves by itself, where damping or sleep follow from it; then its drag. list: all
+ * but the solver [n] */
+static pal_err find_damping(pal_plan_requests *s, pal_component *list, int n)
+{
+    pal_body *body = s->build.body;
+    pal_material material = s->build.def->material;
+    bool wanted = material.damping_1_s == PAL_DAMPING_DERIVED, moves = true;
+    for (int i = 0; i < s->n_request; i++) {
+        wanted |= s->request[i].effect->sleep.wakes != NULL;
+        moves &= strcmp(s->request[i].effect->name, "static_newton") != 0;
+    }
+    s->build.made = list, s->build.n_made = n;
+    if (wanted && moves) PAL_TRY(pal_lowest_frequency_find(&s->build, NULL));
+    const double rate_1_s = pal_material_damping_1_s(&material, body->lowest_1_s);
+    const bool other = rate_1_s != pal_material_damping_1_s(&material, 0);
+    material.damping_1_s = rate_1_s;
+    if (other && body->dofs.set_material) body->dofs.set_material(body, &material);
+    for (int i = 0; i < n && other; i++)
+        if (list[i].effect->drag && list[i].effect->material)
+            PAL_TRY(list[i].effect->material(list[i].self, body, &material, s->build.diag));
+    body->damping_1_s = pal_guard_drag_1_s(list, n);
+    return PAL_ERR_OK;
+}
+
 static pal_err make_components(pal_plan_requests *s, pal_component *list, int *n_component)
 {
     int n_solve = 0, first = *n_component;
@@ -89,7 +115,8 @@ static pal_err make_components(pal_plan_requests *s, pal_component *list, int *n
     }
     /* the OUTPUT component first: its make says what the body shows, which is what tools touch; the SOLVE component
      * last: the others have said what they want of it */
-    for (int pass = 0; pass < 3; pass++)
+    for (int pass = 0; pass < 3; pass++) {
+        if (pass == 2) PAL_TRY(find_damping(s, list + first, *n_component - first));
         for (int i = 0; i < s->n_request; i++) {
             pal_stage stage = s->request[i].effect->stage;
             if (pass != (stage == PAL_STAGE_OUTPUT ? 0 : stage == PAL_STAGE_SOLVE ? 2 : 1)) continue;
@@ -100,6 +127,7 @@ static pal_err make_components(pal_plan_requests *s, pal_component *list, int *n
             PAL_TRY(pal_plan_requests_make(s, &s->request[i], shown, r));
             n_solve += r->effect->stage == PAL_STAGE_SOLVE;
         }
+    }
     if (n_solve != 1) return PAL_REFUSE(s->build.diag, "body \"%s\": %d solvers, wanted one", name, n_solve);
     return PAL_ERR_OK;
 }

@@ -89,8 +89,11 @@ size_t pal_plan_request_reason(const pal_plan_requests *s, const pal_plan_reques
     const pal_body_def *def = s->build.def;
     bool from_model = item >= s->from_model.row && item < s->from_model.row + PAL_ENTRIES_MAX;
     if (from_model && request->effect->drag)
-        return (size_t)snprintf(text, n_byte, "material.damping_1_s %g of body \"%s\"", def->material.damping_1_s,
-                                def->name);
+        return def->material.damping_1_s == PAL_DAMPING_DERIVED
+                   ? (size_t)snprintf(text, n_byte, "material.damping_ratio %g of body \"%s\": %.3g 1/s",
+                                      def->material.damping_ratio, def->name, s->build.body->damping_1_s)
+                   : (size_t)snprintf(text, n_byte, "material.damping_1_s %g of body \"%s\"", def->material.damping_1_s,
+                                      def->name);
     if (from_model) return (size_t)snprintf(text, n_byte, "%s \"%s\"", model->path, model->name);
     return (size_t)snprintf(text, n_byte, "%s \"%s\"", item->path, item->name);
 }

@@ -35,7 +35,7 @@ static void put_sample(pal_material_samples *to, size_t i, const pal_material *m
     to->young_Pa[i] = (float)m->young_Pa;
     to->poisson[i] = (float)m->poisson;
     to->density_kg_m3[i] = (float)m->density_kg_m3;
-    to->damping_1_s[i] = (float)m->damping_1_s;
+    to->damping_1_s[i] = (float)pal_material_damping_1_s(m, 0);
 }
 
 /* constant material, or by the position of every point */

@@ -3,6 +3,8 @@
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
+#include "server/sim/core/step_guard.h"
+#include "server/sim/implicit/lowest_frequency.h"
 #include "server/sim/recovery/stiffening_damper.h"
 #include "server/sim/world/world_core.h"
 
@@ -188,6 +190,7 @@ static pal_err create(pal_world *w, const pal_scene *scene, pal_diagnostic *diag
     for (int b = 0; b < w->plan.n_body; b++) {
         w->material[b] = scene->body[b].material;
         PAL_TRY(pal_material_check(&w->material[b], diag));
+        pal_world_keep_lowest(w, b);
         PAL_TRY(make_part(w, b));
     }
     PAL_TRY(pal_field_components_check(&w->plan, diag));
@@ -220,6 +223,17 @@ void pal_world_destroy(pal_world *world)
 
 /* ---- a step ---- */
 
+void pal_world_keep_lowest(pal_world *w, int b)
+{
+    w->found_1_s[b] = w->plan.body[b].lowest_1_s;
+    w->found_with[b] = w->material[b];
+}
+
+double pal_world_drag_1_s(const pal_world *w, int b)
+{
+    return pal_guard_drag_1_s(w->plan.component + w->plan.first[PAL_STAGE_FORCE][b], w->plan.n_of[PAL_STAGE_FORCE][b]);
+}
+
 double pal_world_component_energy_J(const pal_world *w, int b)
 {
     double sum = 0;
@@ -229,6 +243,17 @@ double pal_world_component_energy_J(const pal_world *w, int b)
             sum += component->effect->energy(component->self, &w->plan.body[b]);
     }
     return sum;
+}
+
+pal_err pal_world_find_lowest(pal_world *world, int body, double *mode)
+{
+    pal_plan *plan = &world->plan;
+    const pal_build build = {.body = &plan->body[body],
+                             .made = plan->component + plan->first[PAL_STAGE_FORCE][body],
+                             .n_made = plan->n_of[PAL_STAGE_FORCE][body]};
+    PAL_TRY(pal_lowest_frequency_find(&build, mode));
+    pal_world_keep_lowest(world, body);
+    return PAL_ERR_OK;
 }
 
 pal_err pal_world_assemble_forces(pal_world *world, int body)

@@ -114,6 +114,9 @@ size_t pal_world_bytes(const pal_world *world);    /* memory of the world's aren
 /* dof of a body with the largest row sum of stiffness over mass by the bounds of its FORCE components, 1/s^2: it sets
  * the limit of explicit steps; -1: none has bounds, or nodes are not dofs. Overwrites body->g. [sim] */
 int pal_world_limit_node(const pal_world *world, int body, double *omega2);
+/* Finds lowest_1_s and lowest_error of a body at rest (implicit/lowest_frequency.h), which creation does where sleep or
+ * a derived damping asks for it. mode: see there; NULL: not asked for. MEMORY. [load] */
+pal_err pal_world_find_lowest(pal_world *world, int body, double *mode);
 /* access to the bodies, for tests, tools and studies [sim] */
 int pal_world_body_count(const pal_world *world);
 pal_body *pal_world_body(pal_world *world, int body);

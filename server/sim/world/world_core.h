@@ -13,6 +13,9 @@ typedef struct pal_world {
     bool has_requested_pose[PAL_TOOL_MAX];
     uint64_t pose_ns[PAL_TOOL_MAX];
     pal_material material[PAL_BODY_MAX];
+    /* the lowest frequency of each body when it was last found, and the material that it had */
+    double found_1_s[PAL_BODY_MAX];
+    pal_material found_with[PAL_BODY_MAX];
     pal_shown part[PAL_BODY_MAX]; /* shown surfaces as at load; face and revision are those of the body */
     double step_s, time_s, limit_s, rest_limit_s;
     int max_substep, n_substep;
@@ -30,6 +33,10 @@ pal_step pal_world_body_step(pal_world *world, int b);
 double pal_world_find_limit(pal_world *world, int sub);
 /* BUDGET: at rest, at the finest level, a step needs more sub-steps than the scene allows */
 pal_err pal_world_check_budget(pal_world *world, pal_diagnostic *diag);
+/* keeps lowest_1_s as that of the present material */
+void pal_world_keep_lowest(pal_world *world, int b);
+/* drag of the components of a body, 1/s */
+double pal_world_drag_1_s(const pal_world *world, int b);
 /* energy stored in the components of a body */
 double pal_world_component_energy_J(const pal_world *world, int b);
 

@@ -4,6 +4,7 @@
 #include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
+#include <math.h>
 #include <string.h>
 
 pal_err pal_world_pose(pal_world *world, int tool, const pal_pose *pose)
@@ -65,9 +66,16 @@ void pal_world_reset(pal_world *world)
     pal_world_show_all(world);
 }
 
-static pal_err apply_material(pal_world *w, int b, const pal_material *to, pal_diagnostic *diag)
+/* given: with a damping that may be one to derive */
+static pal_err apply_material(pal_world *w, int b, const pal_material *given, pal_diagnostic *diag)
 {
     pal_body *body = &w->plan.body[b];
+    pal_material own = *given, *to = &own;
+    const pal_material *with = &w->found_with[b];
+    /* all moduli and masses are scaled; another Poisson's ratio changes the frequency by little */
+    const double stiffer = given->young_Pa / with->young_Pa, heavier = given->density_kg_m3 / with->density_kg_m3;
+    body->lowest_1_s = w->found_1_s[b] * sqrt(stiffer / heavier);
+    to->damping_1_s = pal_material_damping_1_s(given, body->lowest_1_s);
     if (body->dofs.set_material) body->dofs.set_material(body, to);
     for (int i = 0; i < w->plan.n_component; i++) {
         const pal_component *component = &w->plan.component[i];
@@ -82,7 +90,8 @@ static pal_err apply_material(pal_world *w, int b, const pal_material *to, pal_d
     if (body->dofs.scale_mass) body->dofs.scale_mass(body, ratio);
     body->load_cap_N = pal_body_load_cap_N(body, to->young_Pa);
     body->full_corner_kg *= ratio;
-    w->material[b] = *to;
+    body->damping_1_s = pal_world_drag_1_s(w, b);
+    w->material[b] = *given;
     return PAL_ERR_OK;
 }
 
@@ -144,6 +153,8 @@ pal_err pal_world_switch_component(pal_world *world, const pal_scene *scene, int
         (void)pal_world_check_budget(world, NULL);
     }
     pal_world_invalidate_limits(world, body);
+    pal_world_keep_lowest(world, body);
+    world->plan.body[body].damping_1_s = pal_world_drag_1_s(world, body);
     return err;
 }
 

@@ -1,0 +1,15 @@
+/* The lowest angular frequency w1 of a body at rest: K v = w1^2 M v, K the stiffness of its FORCE components at rest
+ * and M its masses. K comes from the components' tangents, or, where an elastic component has none (springs), from
+ * differences of forces: points without a common neighbour move together. The preconditioner is an
+ * incomplete factor of K (num/incomplete_cholesky.h) with the rigid motions of parts of the body
+ * (num/rigid_clusters.h), so that 10 to 70 iterations do for every size and shape (num/lowest_mode.h). Thread: [load],
+ * or [sim] between steps: it takes heap memory. */
+#ifndef PAL_SIM_IMPLICIT_LOWEST_FREQUENCY_H
+#define PAL_SIM_IMPLICIT_LOWEST_FREQUENCY_H
+#include "server/sim/core/effect.h"
+
+/* Fills lowest_1_s and lowest_error of the body that build->made [n_made] belong to; both 0: not known, because part of
+ * the body moves as a rigid one, or the work would be too much. The body is at rest. mode: its mode, of mass 1 kg m^2
+ * [n_dof][3]; NULL: not asked for. MEMORY */
+pal_err pal_lowest_frequency_find(const pal_build *build, double *mode);
+#endif
