@@ -17,8 +17,9 @@
 /* s, simulated. Total of sub-steps that gained energy in spite of all iterations, before the body has to stop in such:
  * an inverted body needs a few of them to recover; they are forgotten after as much time without one
  * (tests/stability/test_fem_cases.c). Between two refreshed factors, each of which takes the spare thread and a copy of
- * the matrix (tests/sim/solvers/test_solve_report.c) */
-#define PAL_PAUSE_S 0.5
+ * the matrix; with 0.5 s a material edit gains energy (tests/sim/solvers/test_solve_report.c,
+ * stability/test_fem_numbers.c) */
+#define PAL_PAUSE_S 0.33
 /* displacement over an element's edge of a difference of forces that gives a product with the true stiffness: far above
  * the rounding of forces in single precision, far below a change of stiffness (tests/sim/implicit, tests/sim/solvers)
  */
