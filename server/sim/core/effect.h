@@ -182,9 +182,8 @@ typedef struct pal_effect {
     /* recovery from inversion */
     struct {
         struct pal_spring_set *(*springs)(void *self); /* FORCE: the springs of the component (spring_recovery.h) */
-        /* FORCE: looks for inverted elements and chooses what they run on from now on. Springs and control cells have
-         * it; solvers call it at the begin of a sub-step. hex_elastic and tet_elastic decide in `linearise` instead,
-         * hex_elastic in explicit steps with every force (sim/README.md, "Recovery from element inversion") */
+        /* FORCE: looks for inverted elements and chooses what they run on from now on; solvers call it at the begin of
+         * a sub-step */
         unsigned (*recover)(void *self, pal_step *step);
         struct pal_recovery *(*state)(void *self); /* FORCE: what `recover` works on (recovery.h); NULL: nothing */
     } recovery;

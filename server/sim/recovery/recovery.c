@@ -499,13 +499,13 @@ static void settle(pal_recovery *r, const pal_body *body, double gain)
 }
 
 /* s rises to 1 as the tank permits; under a load that would draw soft tissue out by 1 / s it rises in any case */
-static void firm(pal_recovery *r, double passed_s, bool pressed)
+static void stiffen(pal_recovery *r, double passed_s, bool pressed)
 {
     for (int p = 0; p < r->n_region; p++) {
         pal_recovery_region *region = &r->of[p];
         if (region->scale >= 1) continue;
         const double phi = region->energy_J / region->scale;
-        double by = fmin(1 - region->scale, passed_s / PAL_RECOVERY_FIRM_S);
+        double by = fmin(1 - region->scale, passed_s / PAL_RECOVERY_STIFFEN_S);
         if (by * phi > r->tank_J && !pressed) by = r->tank_J / phi;
         region->scale += by, region->energy_J += by * phi;
         pay(r, by * phi);
@@ -525,7 +525,8 @@ static bool leave(pal_recovery *r, const pal_body *body, double elements_J)
         const double all_J = r->model.energy(r->model.self, body), rise = all_J - elements_J - region->energy_J;
         const double stored_J = rise + region->energy_J,
                      strain2 = PAL_RECOVERY_LEAVE_STRAIN * PAL_RECOVERY_LEAVE_STRAIN;
-        if (rise > r->tank_J || stored_J > strain2 / 6 * region->size_J) continue;
+        const bool calm = isinf(r->tank_J) || region->good_s >= PAL_RECOVERY_WHOLE_S;
+        if (rise > r->tank_J || (!calm && stored_J > strain2 / 6 * region->size_J)) continue;
         for (int e = 0; e < r->model.n_element; e++)
             if (r->region[e] == p) r->region[e] = NOT;
         elements_J = all_J;
@@ -581,7 +582,7 @@ static bool update(pal_recovery *r, pal_step *step, double passed_s)
             r->tank_J = INFINITY;
         else
             settle(r, body, r->booked_J);
-        firm(r, step->finds_balance ? INFINITY : passed_s, false);
+        stiffen(r, step->finds_balance ? INFINITY : passed_s, false);
     }
     if (good) {
         before_J = r->model.energy(r->model.self, body);
@@ -619,6 +620,10 @@ unsigned pal_recovery_update(pal_recovery *r, pal_step *step)
     r->model.ratios(r->model.self, body, r->low, r->high, r->middle);
     bool bad = false;
     for (int e = 0; e < r->model.n_element; e++) bad |= r->region[e] < 0 ? is_bad(r, e) : !is_good(r, e);
+    if (!bad && r->n_region == 0) {
+        r->was_bad = false;
+        return 0;
+    }
     r->bad_s = bad && r->was_bad ? r->bad_s + passed_s : 0;
     r->was_bad = bad;
     const bool acted = r->n_region > 0, changed = update(r, step, passed_s);

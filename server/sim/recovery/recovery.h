@@ -21,8 +21,8 @@
  * Energy book. A tank T >= 0, empty when the first region is formed, receives what the body dissipates while no load
  * acts, and pays for every change at fixed x: of s, of the elements in regions, of material or supports. A change that
  * T cannot pay is made smaller: s begins at most so large that the energy does not rise, and rises to 1 as T permits,
- * within PAL_RECOVERY_FIRM_S at the fastest. Without loads E + kinetic energy + T - debt never increases; debt is what
- * the floor of s has put in (PAL_RECOVERY_SOFT_MIN), and dissipation repays it before it fills T.
+ * within PAL_RECOVERY_STIFFEN_S at the fastest. Without loads E + kinetic energy + T - debt never increases; debt is
+ * what the floor of s has put in (PAL_RECOVERY_SOFT_MIN), and dissipation repays it before it fills T.
  *
  * State (regions, s, T, clocks) goes over to another body of the same elements, as at a switch of supports
  * (pal_recovery_transfer). Memory: an arena of the caller; no heap in a step. Thread: [load] to make, then [sim]. */

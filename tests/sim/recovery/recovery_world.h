@@ -11,7 +11,11 @@ typedef struct recovery_kind {
     const char *element, *law;
     bool implicit; /* energy falls in every step */
 } recovery_kind;
-static const recovery_kind recovery_kinds[] = {{"hex8_bbar", "corotational", true}, {"hex8", "neo_hookean", true}};
+static const recovery_kind recovery_kinds[] = {{"hex8_bbar", "corotational", true},
+                                               {"hex8", "neo_hookean", true},
+                                               {"tet4", "corotational", true},
+                                               {"tet4", "neo_hookean", true},
+                                               {"tet10", "corotational", true}};
 enum { RECOVERY_KINDS = sizeof recovery_kinds / sizeof *recovery_kinds };
 
 static inline void recovery_open(fem_beam *b, const recovery_kind *kind, int nx, int ny, int nz)
