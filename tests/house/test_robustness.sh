@@ -38,7 +38,7 @@ for scene in fem springs; do
     end
 done
 
-begin "energy stored on the way to the five-tetrahedra split is no gain, also after a switch of supports"
+begin "inversion under a load gains no energy, also after a switch of supports"
 "$palpate" prepare --shape sphere --hold 12 --resolution 6 --model fem -o soft --quiet || exit 2
 sed -i 's/"young_Pa":.*/"young_Pa": 2000,/' soft/scene.json
 check "the scene is soft" has soft/scene.json '"young_Pa": 2000,'

@@ -121,8 +121,8 @@ void pal_recovery_transfer(pal_recovery *r, const pal_recovery *from)
     memcpy(r->region, from->region, sizeof *r->region * (size_t)r->model.n_element);
     memcpy(r->of, from->of, sizeof r->of);
     const bool any = r->n_region > 0 || from->n_region > 0;
-    r->n_region = from->n_region, r->was_bad = from->was_bad, r->bad_s = from->bad_s, r->tank_J = from->tank_J;
-    r->debt_J = from->debt_J, r->booked_J = from->booked_J, r->seen_s = from->seen_s, r->touched = from->touched;
+    r->n_region = from->n_region, r->was_bad = from->was_bad, r->bad_s = from->bad_s, r->tank_J = 0;
+    r->debt_J = from->debt_J, r->booked_J = from->booked_J, r->seen_s = from->seen_s, r->touched = true;
     memcpy(r->d_m, from->d_m, 3 * sizeof *r->d_m * (size_t)r->n_node);
     memcpy(r->load_N, from->load_N, 3 * sizeof *r->load_N * (size_t)r->n_node);
     if (any) show(r);
@@ -525,8 +525,8 @@ static bool leave(pal_recovery *r, const pal_body *body, double elements_J)
         const double all_J = r->model.energy(r->model.self, body), rise = all_J - elements_J - region->energy_J;
         const double stored_J = rise + region->energy_J,
                      strain2 = PAL_RECOVERY_LEAVE_STRAIN * PAL_RECOVERY_LEAVE_STRAIN;
-        const bool calm = isinf(r->tank_J) || region->good_s >= PAL_RECOVERY_WHOLE_S;
-        if (rise > r->tank_J || (!calm && stored_J > strain2 / 6 * region->size_J)) continue;
+        const bool settled = isinf(r->tank_J) || region->good_s >= PAL_RECOVERY_WHOLE_S;
+        if (rise > r->tank_J || (!settled && stored_J > strain2 / 6 * region->size_J)) continue;
         for (int e = 0; e < r->model.n_element; e++)
             if (r->region[e] == p) r->region[e] = NOT;
         elements_J = all_J;

@@ -24,8 +24,9 @@
  * within PAL_RECOVERY_STIFFEN_S at the fastest. Without loads E + kinetic energy + T - debt never increases; debt is
  * what the floor of s has put in (PAL_RECOVERY_SOFT_MIN), and dissipation repays it before it fills T.
  *
- * State (regions, s, T, clocks) goes over to another body of the same elements, as at a switch of supports
- * (pal_recovery_transfer). Memory: an arena of the caller; no heap in a step. Thread: [load] to make, then [sim]. */
+ * State (regions, s, debt, clocks) goes over to another body of the same elements, as at a switch of supports
+ * (pal_recovery_transfer). T begins anew there, and where loads change: nobody sees more energy than at the change.
+ * Memory: an arena of the caller; no heap in a step. Thread: [load] to make, then [sim]. */
 #ifndef PAL_SIM_RECOVERY_RECOVERY_H
 #define PAL_SIM_RECOVERY_RECOVERY_H
 #include "server/num/block_matrix.h"
