@@ -1,7 +1,6 @@
 /* Cases with tools, invalid numbers, supports, and random commands that combine them. */
 #include "server/base/vec3.h"
 #include "server/robustness/trial.h"
-#include "server/sim/elements/elastic_hex.h"
 #include "server/sim/transfer/transfer_world.h"
 
 #include <stdlib.h>
@@ -196,25 +195,6 @@ static void support_top(const pal_trial *trial, pal_scene *scene)
     }
 }
 
-/* Energy of a world that has just taken over the state of another. Hexahedra and their split store different
- * energies at the same shape. Those that ran on their split are evaluated on it here too, although only the next
- * step decides this. */
-static double transferred_J(pal_world *next, const pal_world *before)
-{
-    double energy = 0;
-    for (int turn = 0; turn < 2; turn++) {
-        for (int i = 0; i < pal_world_component_count(next) && i < pal_world_component_count(before); i++) {
-            const pal_component *component = pal_world_component(next, i), *was = pal_world_component(before, i);
-            if (component->effect != was->effect || strcmp(component->effect->name, "hex_elastic")) continue;
-            pal_elastic_hexes *to = component->self;
-            const pal_elastic_hexes *from = was->self;
-            to->has_inversion = turn == 0 && from->has_inversion && to->split;
-        }
-        if (turn == 0) energy = pal_world_energy_J(next);
-    }
-    return energy;
-}
-
 /* a world made from another scene continues from the present state */
 static bool switch_scene(pal_trial *trial, const pal_scene *scene, double *jump)
 {
@@ -227,7 +207,7 @@ static bool switch_scene(pal_trial *trial, const pal_scene *scene, double *jump)
     }
     double before = pal_world_energy_J(trial->world);
     pal_world_transfer(next, trial->world, -1, NULL, NULL);
-    *jump = fmax(*jump, transferred_J(next, trial->world) - before);
+    *jump = fmax(*jump, pal_world_energy_J(next) - before);
     pal_world_destroy(trial->world);
     trial->world = next;
     pal_trial_rebase(trial);

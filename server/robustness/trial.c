@@ -3,7 +3,6 @@
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
 #include "server/num/random.h"
-#include "server/sim/elements/elastic_hex.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -108,36 +107,9 @@ double pal_trial_energy(const pal_trial *trial)
     return sum;
 }
 
-/* Hexahedra and their split store different energies at the same shape: takes the larger one. */
-static double shape_energy(const pal_trial *trial)
-{
-    double now = pal_trial_energy(trial);
-    for (int i = 0; i < pal_world_component_count(trial->world); i++) {
-        const pal_component *component = pal_world_component(trial->world, i);
-        pal_elastic_hexes *hex = strcmp(component->effect->name, "hex_elastic") ? NULL : component->self;
-        if (!hex || !hex->split) continue;
-        hex->has_inversion = !hex->has_inversion;
-        now = fmax(now, pal_trial_energy(trial));
-        hex->has_inversion = !hex->has_inversion;
-    }
-    return now;
-}
-
-static uint64_t count_splits(const pal_trial *trial)
-{
-    uint64_t n = 0;
-    for (int b = 0; b < trial->scene->n_body; b++) {
-        const pal_body *body = pal_world_body(trial->world, b);
-        /* inverted regions of springs begin and end without added energy */
-        if (!body->recovery) n += body->safeguards.n_split;
-    }
-    return n;
-}
-
 void pal_trial_rebase(pal_trial *trial)
 {
-    trial->base_J = shape_energy(trial);
-    trial->n_split = count_splits(trial); /* the counter restarts when a world is made or reset */
+    trial->base_J = pal_trial_energy(trial);
     trial->allowed_J = 0;
     trial->scale_J = fmax(trial->scale_J, fabs(pal_world_energy_J(trial->world) - trial->rest_J));
 }
@@ -265,10 +237,6 @@ static void monitor(pal_trial *trial)
     }
     double energy = pal_world_energy_J(trial->world);
     trial->scale_J = fmax(trial->scale_J, fabs(energy - trial->rest_J));
-    /* hexahedra and their split store different energies at the same shape */
-    uint64_t n_split = count_splits(trial);
-    if (n_split != trial->n_split) pal_trial_exclude_rise(trial, pal_trial_energy(trial));
-    trial->n_split = n_split;
     trial->excess_J = fmax(trial->excess_J, pal_trial_energy(trial) - trial->base_J - trial->allowed_J);
     sample(trial);
 }

@@ -27,7 +27,6 @@ typedef struct pal_trial {
     /* Energy less the work of sustained loads. It may only fall after the last change of those loads. */
     double base_J, scale_J, excess_J, allowed_J;
     double excluded_rise_J; /* sum of the rises that were not judged */
-    uint64_t n_split;
     int n_skip, since;
     uint64_t count;  /* random numbers drawn */
     bool rest_late;  /* the processor time was over before the scene was at rest */

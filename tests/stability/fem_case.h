@@ -73,16 +73,25 @@ static inline double hard_work_J(const pal_body *body)
     return sum;
 }
 
-/* kinetic and elastic energy; of hexahedra the larger one of the cubes' and the split's */
+/* kinetic and elastic energy */
 static inline double hard_energy_J(const fem_beam *b)
 {
-    double now = pal_world_energy_J(b->world);
-    pal_elastic_hexes *hex = hard_hex_row(b);
-    if (!hex || !hex->split) return now;
-    hex->has_inversion = !hex->has_inversion;
-    double other = pal_world_energy_J(b->world);
-    hex->has_inversion = !hex->has_inversion;
-    return fmax(now, other);
+    return pal_world_energy_J(b->world);
+}
+
+/* elements that recovery has replaced by the edges of a region */
+static inline bool hard_recovers(const fem_beam *b)
+{
+    return pal_recovery_acts(hard_hex_row(b)->recovery);
+}
+
+/* how many elements those are */
+static inline int hard_in_regions(const fem_beam *b)
+{
+    const pal_recovery *r = hard_hex_row(b)->recovery;
+    int n = 0;
+    for (int e = 0; e < r->model.n_element; e++) n += r->region[e] >= 0;
+    return n;
 }
 
 enum { HARD_PLANE, HARD_POINT, HARD_MIRROR, HARD_BLOWN, HARD_SHUFFLE, HARD_SWAP, HARD_CASES };

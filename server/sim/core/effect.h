@@ -39,6 +39,7 @@ typedef struct pal_step {
     pal_component *adapt; /* ADAPT components of the body                                    [n_adapt]   */
     int n_adapt;
     bool drag_separate; /* set by a solver that applies drag itself: pal_assemble_forces omits those components  */
+    bool finds_balance; /* set by a solver that goes from balance to balance, so that energy has no meaning between  */
     double dt_s;        /* length of this sub-step; of the whole step in ADAPT, GUARD, OUTPUT                     */
     double time_s;      /* at its end                                                                            */
     int sub, n_sub;     /* number of this sub-step, and how many; n_sub may grow in a step with large deformation */
@@ -181,10 +182,10 @@ typedef struct pal_effect {
     /* recovery from inversion */
     struct {
         struct pal_spring_set *(*springs)(void *self); /* FORCE: the springs of the component (spring_recovery.h) */
-        /* FORCE: looks for inverted elements and chooses what they run on from now on. Springs and control cells have
-         * it; solvers call it at the begin of a sub-step. hex_elastic and tet_elastic decide in `linearise` instead,
-         * hex_elastic in explicit steps with every force (sim/README.md, "Recovery from element inversion") */
+        /* FORCE: looks for inverted elements and chooses what they run on from now on; solvers call it at the begin of
+         * a sub-step */
         unsigned (*recover)(void *self, pal_step *step);
+        struct pal_recovery *(*state)(void *self); /* FORCE: what `recover` works on (recovery.h); NULL: nothing */
     } recovery;
 
     /* sleep of a body at rest */

@@ -2,12 +2,7 @@
  *
  * Keys: element ("hex8_bbar": mean dilatation, the default | "hex8": full integration), law ("corotational" |
  * "linear" | "neo_hookean"), fill (true: the stiffness of a voxel is scaled by its fraction inside the surface, at
- * least PAL_FILL_MIN), recover (true: while a corner is inverted the body uses its five-tetrahedra split, and a
- * persistent inversion is straightened, elastic_tet.h; not for linear).
- *
- * The decision on inversion recovery is taken at linearise; without an implicit solver at every evaluation of forces.
- */
-#include "server/base/clock.h"
+ * least PAL_FILL_MIN), recover (true: recovery from inversion, recovery/recovery.h; not for linear). */
 #include "server/sim/core/effect_list.h"
 #include "server/sim/elements/elastic_hex.h"
 
@@ -32,27 +27,20 @@ static pal_err run(void *self, pal_step *step)
 {
     pal_elastic_hexes *row = self;
     pal_body *body = step->body;
-    if (!row->implicit) pal_hex_recover(row, body);
-    body->safeguards.n_inversion += row->n_inversion, body->safeguards.n_split += row->n_switch;
-    row->n_inversion = row->n_switch = 0;
-    if (row->has_inversion) {
-        uint64_t before = pal_clock_ns();
-        pal_elastic_tets_force(row->split, body->d, body->f);
-        body->safeguards.ns += pal_clock_ns() - before;
-    } else if (pal_force_cache_matches(&row->force_cache, body->d)) {
+    pal_recovery_select(row->recovery, body);
+    if (pal_force_cache_matches(&row->force_cache, body->d)) {
         pal_force_cache_add(&row->force_cache, body->f);
     } else {
         pal_node_order_load(body->node_order, body->d);
         (row->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_run : pal_hex_corot_run)(row, body->node_order, PAL_RUN_FORCE);
         pal_node_order_add(body->node_order, body->f);
     }
+    pal_recovery_add_forces(row->recovery, body);
     return PAL_ERR_OK;
 }
 
-static double energy(void *self, const pal_body *body)
+static double elements_energy(pal_elastic_hexes *row, const pal_body *body)
 {
-    pal_elastic_hexes *row = self;
-    if (row->has_inversion) return pal_elastic_tets_energy(row->split, body->d, NULL);
     if (pal_force_cache_matches(&row->force_cache, body->d)) return row->force_cache.energy_J;
     pal_node_order_load(body->node_order, body->d);
     double *forces = pal_force_cache_begin(&row->force_cache, body->d);
@@ -63,16 +51,33 @@ static double energy(void *self, const pal_body *body)
     return pal_force_cache_commit(&row->force_cache, sum);
 }
 
+static double energy(void *self, const pal_body *body)
+{
+    pal_elastic_hexes *row = self;
+    pal_recovery_select(row->recovery, body);
+    return elements_energy(row, body) + pal_recovery_energy(row->recovery, body->d, NULL, NULL);
+}
+
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
     pal_elastic_hexes *row = self;
-    if (row->has_inversion)
-        pal_elastic_tets_bound(row->split, body->d, bound_N_m);
-    else if (row->law == PAL_LAW_NEO_HOOKEAN)
+    pal_recovery_select(row->recovery, body);
+    if (row->law == PAL_LAW_NEO_HOOKEAN)
         pal_hex_neo_bound(row, body, bound_N_m);
     else
         for (int i = 0; i < 8 * row->n_hex; i++)
             bound_N_m[row->hexes->node[i]] += row->bound[row->simd_blocks.place[i / 8]];
+    pal_recovery_bound(row->recovery, bound_N_m);
+}
+
+static unsigned recover(void *self, pal_step *step)
+{
+    return pal_recovery_update(((pal_elastic_hexes *)self)->recovery, step);
+}
+
+static pal_recovery *recovery(void *self)
+{
+    return ((pal_elastic_hexes *)self)->recovery;
 }
 
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
@@ -98,12 +103,7 @@ static bool couple(void *self, pal_cliques *out)
 static void linearise(void *self, const pal_body *body)
 {
     pal_elastic_hexes *row = self;
-    pal_hex_recover(row, body);
-    if (row->implicit && row->split) row->n_switch += pal_elastic_tets_check_rest(row->split, body, row->has_inversion);
-    if (row->has_inversion) {
-        pal_elastic_tets_linearise(row->split, body->d);
-        return;
-    }
+    pal_recovery_select(row->recovery, body);
     pal_node_order_load(body->node_order, body->d);
     (row->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_linearise : pal_hex_corot_linearise)(row, body->node_order);
 }
@@ -111,49 +111,34 @@ static void linearise(void *self, const pal_body *body)
 static void multiply(void *self, const pal_body *body, double k, const double *p, double *out)
 {
     const pal_elastic_hexes *row = self;
-    if (row->has_inversion) {
-        pal_elastic_tets_multiply(row->split, k, p, out);
-        return;
-    }
     pal_node_order_load(body->node_order, p);
     (row->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_multiply : pal_hex_corot_multiply)(row, body->node_order, k);
     pal_node_order_add(body->node_order, out);
+    pal_recovery_multiply(row->recovery, k, p, out);
 }
 
 static void assemble(void *self, double k, pal_block_matrix *to)
 {
     pal_elastic_hexes *row = self;
-    if (row->has_inversion)
-        pal_elastic_tets_assemble(row->split, k, to);
-    else
-        pal_hex_assemble(row, k, to);
+    pal_hex_assemble(row, k, to);
+    pal_recovery_assemble(row->recovery, k, to);
 }
 
 static void rotate(void *self, double *rotation)
 {
     const pal_elastic_hexes *row = self;
-    if (row->has_inversion)
-        pal_elastic_tets_rotate(row->split, rotation);
-    else
-        pal_hex_rotate(row, rotation);
+    pal_hex_rotate(row, rotation);
+    pal_recovery_rotate(row->recovery, rotation);
 }
 
 static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
 {
-    pal_elastic_hexes *row = self;
-    if (row->has_inversion)
-        pal_elastic_tets_measure(row->split, body->d, field, sum, volume_m3);
-    else
-        pal_hex_measure(row, body, field, sum, volume_m3);
+    pal_hex_measure(self, body, field, sum, volume_m3);
 }
 
 static void stress(void *self, const pal_body *body, pal_stress_take *take, void *user)
 {
-    pal_elastic_hexes *row = self;
-    if (row->has_inversion)
-        pal_elastic_tets_stress(row->split, body->d, take, user);
-    else
-        pal_hex_stress(row, body, take, user);
+    pal_hex_stress(self, body, take, user);
 }
 
 static const pal_tangent tangent = {
@@ -166,6 +151,8 @@ const pal_effect pal_effect_hex_elastic = {.name = "hex_elastic",
                                            .run = run,
                                            .energy = energy,
                                            .bounds.stiffness = stiffness,
+                                           .recovery.recover = recover,
+                                           .recovery.state = recovery,
                                            .material = material,
                                            .reset = reset,
                                            .tangent = &tangent,

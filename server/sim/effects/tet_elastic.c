@@ -1,87 +1,19 @@
 /* Component tet_elastic: elastic tetrahedra of four or ten nodes (elastic_tet.h).
  *
  * Keys: element ("tet4" or "tet10"; default by the body's elements), law ("corotational", "linear", "neo_hookean"),
- * fill (true: stiffness by the fraction of material in each element where the body has it), recover (true).
- *
- * Inversion recovery extends the rule of elastic_tet.h, which alone left bodies with ten-node elements or the
- * neo-Hookean law inverted permanently. Under an implicit solver the whole body uses its split while any piece is
- * inverted: tetrahedra of four nodes (eight in one of ten), corotational, with the rule and Poisson ratios of at most
- * PAL_SPLIT_POISSON_MAX. Pieces are checked when the tangent is taken, against det F <= 0 (corotational tet4) or the
- * ratios PAL_INVERTED_LOW and, for neo_hookean, _HIGH; the body has recovered when every piece is within
- * PAL_TET_RECOVERED_LOW and, for neo_hookean, _HIGH. A body that rests folded on the split is straightened.
+ * fill (true: stiffness by the fraction of material in each element where the body has it), recover (true: recovery
+ * from inversion, recovery/recovery.h; not for linear).
  *
  * `internal` is true for corotational and neo_hookean. The linear law has no net force, but a torque under rotation,
  * and ten-node corotational elements have a torque while an element is almost completely crushed (elastic_tet.h). */
-#include "server/base/clock.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/core/force_cache.h"
 #include "server/sim/elements/elastic_tet.h"
 
-#include <math.h>
-
 typedef struct tet_row {
-    pal_elastic_tets whole;         /* first member: tests read it */
-    pal_elastic_tets *split;        /* NULL: no inversion recovery by the split */
-    double *rest_m3;                /* volume of each piece at rest [n_piece] */
-    double min_volume_m3;           /* of the pieces that are checked */
-    bool has_inversion, cheap;      /* cheap: whole.n_inverted shows that the body is inverted */
-    uint64_t n_inversion, n_switch; /* since run, which has the body */
-    pal_force_cache force_cache;    /* under an implicit solver: of `whole` while nothing is inverted */
+    pal_elastic_tets whole;      /* first member: tests read it                     */
+    pal_force_cache force_cache; /* under an implicit solver: of the elements alone */
 } tet_row;
-
-/* the split: eight tetrahedra of four nodes in one of ten */
-static pal_err cut(const tet_row *row, pal_arena *arena, pal_elastic_tets_options *to)
-{
-    static const int piece[8][4] = {{0, 4, 6, 7}, {4, 1, 5, 8}, {6, 5, 2, 9}, {7, 8, 9, 3},
-                                    {6, 8, 4, 5}, {6, 8, 5, 9}, {6, 8, 9, 7}, {6, 8, 7, 4}};
-    const pal_elastic_tets_options *from = &row->whole.options;
-    *to = *from;
-    to->law = PAL_LAW_COROTATIONAL, to->recover = true, to->max_poisson = PAL_LOCK_FREE_POISSON;
-    if (from->n_corner == 4) return PAL_ERR_OK;
-    to->n_corner = 4, to->n_tet = 8 * from->n_tet;
-    int32_t *tet = PAL_NEW(arena, int32_t, 4 * (size_t)to->n_tet);
-    float *fill = PAL_NEW(arena, float, from->fill ? to->n_tet : 0);
-    if (!tet || !fill) return PAL_ERR_MEMORY;
-    for (int i = 0; i < to->n_tet; i++) {
-        for (int c = 0; c < 4; c++) tet[4 * i + c] = from->tet[10 * (i / 8) + piece[i % 8][c]];
-        if (from->fill) fill[i] = from->fill[i / 8];
-    }
-    to->tet = tet, to->fill = from->fill ? fill : NULL;
-    return PAL_ERR_OK;
-}
-
-static pal_err make_split(tet_row *row, pal_build *build)
-{
-    const pal_elastic_tets_options *whole = &row->whole.options;
-    const double h = build->body->edge_m;
-    pal_elastic_tets_options options;
-    PAL_TRY(cut(row, build->arena, &options));
-    row->split = PAL_NEW(build->arena, pal_elastic_tets, 1);
-    if (!row->split) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_elastic_tets_make(&options, build, row->split));
-    row->cheap = whole->n_corner == 4 && whole->law == PAL_LAW_COROTATIONAL;
-    /* skip slivers: they invert at any contact and say nothing about the body */
-    row->min_volume_m3 = 1e-3 / 6 * h * h * h;
-    row->rest_m3 = PAL_NEW(build->arena, double, options.n_tet);
-    if (!row->rest_m3) return PAL_ERR_MEMORY;
-    for (int i = 0; i < options.n_tet; i++) row->rest_m3[i] = pal_tet_volume(build->body->x_rest, options.tet + 4 * i);
-    return PAL_ERR_OK;
-}
-
-static bool is_inverted(const tet_row *row, const double *x)
-{
-    if (row->cheap && !row->has_inversion) return row->whole.n_inverted > 0;
-    const double low = row->has_inversion ? PAL_TET_RECOVERED_LOW : PAL_INVERTED_LOW,
-                 high = row->has_inversion ? PAL_TET_RECOVERED_HIGH : PAL_INVERTED_HIGH;
-    bool neo = row->whole.options.law == PAL_LAW_NEO_HOOKEAN;
-    const pal_elastic_tets_options *pieces = &row->split->options;
-    for (int i = 0; i < pieces->n_tet; i++) {
-        if (fabs(row->rest_m3[i]) < row->min_volume_m3) continue;
-        double det = pal_tet_volume(x, pieces->tet + 4 * i) / row->rest_m3[i];
-        if (det < low || (neo && det > high)) return true;
-    }
-    return false;
-}
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
@@ -107,44 +39,54 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     if (!row) return PAL_ERR_MEMORY;
     *self = row;
     PAL_TRY(pal_elastic_tets_make(&options, build, &row->whole));
-    if (body->implicit) PAL_TRY(pal_force_cache_make(body->n_node, build->arena, &row->force_cache));
-    return options.recover && body->implicit && options.law != PAL_LAW_LINEAR ? make_split(row, build) : PAL_ERR_OK;
-}
-
-/* elements that forces come from now */
-static pal_elastic_tets *acting(void *self)
-{
-    tet_row *row = self;
-    return row->has_inversion ? row->split : &row->whole;
+    if (!body->implicit) return PAL_ERR_OK;
+    row->whole.counted = &row->force_cache;
+    return pal_force_cache_make(body->n_node, build->arena, &row->force_cache);
 }
 
 static pal_err run(void *self, pal_step *step)
 {
     tet_row *row = self;
-    step->body->safeguards.n_inversion += row->n_inversion, step->body->safeguards.n_split += row->n_switch;
-    row->n_inversion = row->n_switch = 0;
-    const uint64_t before = row->has_inversion ? pal_clock_ns() : 0;
-    if (!row->has_inversion && pal_force_cache_matches(&row->force_cache, step->body->d))
-        pal_force_cache_add(&row->force_cache, step->body->f);
+    pal_body *body = step->body;
+    pal_recovery_select(row->whole.recovery, body);
+    if (pal_force_cache_matches(&row->force_cache, body->d))
+        pal_force_cache_add(&row->force_cache, body->f);
     else
-        pal_elastic_tets_force(acting(self), step->body->d, step->body->f);
-    if (row->has_inversion) step->body->safeguards.ns += pal_clock_ns() - before;
+        pal_elastic_tets_force(&row->whole, body->d, body->f);
+    pal_recovery_add_forces(row->whole.recovery, body);
     return PAL_ERR_OK;
+}
+
+static double elements_energy(tet_row *row, const double *d)
+{
+    if (pal_force_cache_matches(&row->force_cache, d)) return row->force_cache.energy_J;
+    double sum = pal_elastic_tets_energy(&row->whole, d, pal_force_cache_begin(&row->force_cache, d));
+    return pal_force_cache_commit(&row->force_cache, sum);
 }
 
 static double energy(void *self, const pal_body *body)
 {
     tet_row *row = self;
-    if (row->has_inversion) return pal_elastic_tets_energy(row->split, body->d, NULL);
-    if (pal_force_cache_matches(&row->force_cache, body->d)) return row->force_cache.energy_J;
-    double sum = pal_elastic_tets_energy(&row->whole, body->d, pal_force_cache_begin(&row->force_cache, body->d));
-    /* the fallback of inverted elements may differ at the next evaluation */
-    return row->whole.n_inverted > 0 ? sum : pal_force_cache_commit(&row->force_cache, sum);
+    pal_recovery_select(row->whole.recovery, body);
+    return elements_energy(row, body->d) + pal_recovery_energy(row->whole.recovery, body->d, NULL, NULL);
 }
 
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
-    pal_elastic_tets_bound(acting(self), body->d, bound_N_m);
+    tet_row *row = self;
+    pal_recovery_select(row->whole.recovery, body);
+    pal_elastic_tets_bound(&row->whole, body->d, bound_N_m);
+    pal_recovery_bound(row->whole.recovery, bound_N_m);
+}
+
+static unsigned recover(void *self, pal_step *step)
+{
+    return pal_recovery_update(((tet_row *)self)->whole.recovery, step);
+}
+
+static pal_recovery *recovery(void *self)
+{
+    return ((tet_row *)self)->whole.recovery;
 }
 
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
@@ -152,7 +94,6 @@ static pal_err material(void *self, const pal_body *body, const pal_material *to
     tet_row *row = self;
     (void)body, (void)diag;
     pal_elastic_tets_material(&row->whole, to);
-    if (row->split) pal_elastic_tets_material(row->split, to);
     pal_force_cache_invalidate(&row->force_cache);
     return PAL_ERR_OK;
 }
@@ -162,20 +103,17 @@ static void reset(void *self, const pal_body *body)
     tet_row *row = self;
     (void)body;
     pal_elastic_tets_reset(&row->whole);
-    if (row->split) pal_elastic_tets_reset(row->split), row->split->n_single_rotation = 0;
-    row->has_inversion = false;
     pal_force_cache_invalidate(&row->force_cache);
-    row->n_inversion = row->n_switch = 0;
 }
 
 static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
 {
-    pal_elastic_tets_measure(acting(self), body->d, field, sum, volume_m3);
+    pal_elastic_tets_measure(self, body->d, field, sum, volume_m3);
 }
 
 static void stress(void *self, const pal_body *body, pal_stress_take *take, void *user)
 {
-    pal_elastic_tets_stress(acting(self), body->d, take, user);
+    pal_elastic_tets_stress(self, body->d, take, user);
 }
 
 static bool couple(void *self, pal_cliques *out)
@@ -188,31 +126,29 @@ static bool couple(void *self, pal_cliques *out)
 static void linearise(void *self, const pal_body *body)
 {
     tet_row *row = self;
-    bool before = row->has_inversion, known = row->split && (before || !row->cheap);
-    bool reported = known && is_inverted(row, body->d);
-    if (!reported) pal_elastic_tets_linearise(&row->whole, body->d);
-    row->has_inversion = known ? reported : row->split && is_inverted(row, body->d);
-    row->n_inversion += row->has_inversion;
-    row->n_switch += row->has_inversion != before;
-    if (row->has_inversion && !before) pal_elastic_tets_reset(row->split);
-    if (row->split) row->n_switch += pal_elastic_tets_check_rest(row->split, body, row->has_inversion);
-    if (row->has_inversion) pal_elastic_tets_linearise(row->split, body->d);
+    pal_recovery_select(row->whole.recovery, body);
+    pal_elastic_tets_linearise(&row->whole, body->d);
 }
 
 static void multiply(void *self, const pal_body *body, double k, const double *p, double *out)
 {
     (void)body;
-    pal_elastic_tets_multiply(acting(self), k, p, out);
+    tet_row *row = self;
+    pal_elastic_tets_multiply(&row->whole, k, p, out);
+    pal_recovery_multiply(row->whole.recovery, k, p, out);
 }
 
 static void assemble(void *self, double k, pal_block_matrix *to)
 {
-    pal_elastic_tets_assemble(acting(self), k, to);
+    tet_row *row = self;
+    pal_elastic_tets_assemble(&row->whole, k, to);
+    pal_recovery_assemble(row->whole.recovery, k, to);
 }
 
 static void rotate(void *self, double *rotation)
 {
-    pal_elastic_tets_rotate(acting(self), rotation);
+    pal_elastic_tets_rotate(self, rotation);
+    pal_recovery_rotate(((tet_row *)self)->whole.recovery, rotation);
 }
 
 static const pal_tangent tangent = {
@@ -225,6 +161,8 @@ const pal_effect pal_effect_tet_elastic = {.name = "tet_elastic",
                                            .run = run,
                                            .energy = energy,
                                            .bounds.stiffness = stiffness,
+                                           .recovery.recover = recover,
+                                           .recovery.state = recovery,
                                            .material = material,
                                            .reset = reset,
                                            .tangent = &tangent,

@@ -2,6 +2,7 @@
 #include "server/sim/elements/elastic_hex.h"
 
 #include <math.h>
+#include <string.h>
 
 void pal_hex_material(pal_elastic_hexes *cubes, const pal_material *material)
 {
@@ -14,8 +15,11 @@ void pal_hex_material(pal_elastic_hexes *cubes, const pal_material *material)
         /* the dilatation or a shear of modes, whose squares are 8 times those of corners */
         cubes->bound[lane] = 8 * scale * fmax(2 * mu, 2 * mu + 3 * lambda);
     }
-    if (cubes->split) pal_elastic_tets_material(cubes->split, material);
     pal_force_cache_invalidate(&cubes->force_cache);
+    if (!cubes->recovery) return;
+    const size_t n = sizeof(double) * PAL_LANES * (size_t)cubes->n_block;
+    memcpy(cubes->whole[0], cubes->mu, n), memcpy(cubes->whole[1], cubes->lambda, n);
+    pal_recovery_refresh(cubes->recovery);
 }
 
 void pal_hex_reset(pal_elastic_hexes *cubes)
@@ -25,43 +29,8 @@ void pal_hex_reset(pal_elastic_hexes *cubes)
             for (int i = 0; i < 4; i++) cubes->q[(4 * b + i) * PAL_LANES + l] = i == 0;
             for (int i = 0; i < 9; i++) cubes->rotation[(9 * b + i) * PAL_LANES + l] = i % 4 == 0;
         }
-    pal_hex_recovery_reset(cubes);
+    if (cubes->recovery) pal_recovery_reset(cubes->recovery);
     pal_force_cache_invalidate(&cubes->force_cache);
-    cubes->n_inversion = cubes->n_switch = 0;
-    if (cubes->split) pal_elastic_tets_reset(cubes->split), cubes->split->n_single_rotation = 0;
-}
-
-/* the five-tetrahedra split: every five tetrahedra fill the cube of the same number */
-static pal_err check_split(const pal_hexes *hexes, const pal_tets *tets, const char *path, pal_diagnostic *diag)
-{
-    if (!tets || tets->n_tet != 5 * hexes->n_hex)
-        return PAL_REFUSE(diag, "%s: %d tetrahedra are no split of %d voxels", path, tets ? tets->n_tet : 0,
-                          hexes->n_hex);
-    for (int i = 0; i < 4 * tets->n_tet; i++) {
-        const int32_t *node = hexes->node + 8 * (i / 20);
-        int c = 0;
-        while (c < 8 && node[c] != tets->tet[i]) c++;
-        if (c == 8) return PAL_REFUSE(diag, "%s: tetrahedron %d is not part of voxel %d", path, i / 4, i / 20);
-    }
-    return PAL_ERR_OK;
-}
-
-static pal_err make_split(pal_elastic_hexes *cubes, pal_build *build, const char *path)
-{
-    const pal_tets *tets = build->body->tets;
-    PAL_TRY(check_split(cubes->hexes, tets, path, build->diag));
-    cubes->split = PAL_NEW(build->arena, pal_elastic_tets, 1);
-    cubes->split_fill = PAL_NEW(build->arena, float, tets->n_tet);
-    if (!cubes->split || !cubes->split_fill) return PAL_ERR_MEMORY;
-    for (int t = 0; t < tets->n_tet; t++) cubes->split_fill[t] = (float)cubes->share[cubes->simd_blocks.place[t / 5]];
-    const pal_elastic_tets_options options = {.law = PAL_LAW_COROTATIONAL,
-                                              .recover = true,
-                                              .max_poisson = PAL_LOCK_FREE_POISSON,
-                                              .n_corner = 4,
-                                              .n_tet = tets->n_tet,
-                                              .tet = tets->tet,
-                                              .fill = cubes->split_fill};
-    return pal_elastic_tets_make(&options, build, cubes->split);
 }
 
 static pal_err take_memory(pal_elastic_hexes *cubes, pal_arena *arena)
@@ -117,7 +86,7 @@ pal_err pal_hex_make(const pal_hex_options *options, pal_build *build, const cha
         out->share[lane] = filled ? 1 : fmax(PAL_FILL_MIN, fmin(1, (double)out->hexes->fill[e]));
     }
     pal_hex_fill_reference(out);
-    if (options->recover && options->law != PAL_LAW_LINEAR) PAL_TRY(make_split(out, build, path));
+    if (options->recover && options->law != PAL_LAW_LINEAR) PAL_TRY(pal_hex_recovery_make(out, build));
     pal_hex_material(out, &build->def->material);
     pal_hex_reset(out);
     return PAL_ERR_OK;

@@ -5,18 +5,15 @@
  * derivative of R is dropped). linear: R = I. neo_hookean: elastic_hex_neo.c. K is integrated in full or with the mean
  * dilatation (B-bar, Hughes 1980).
  *
- * Recovery from inversion (corotational and neo_hookean): while any corner's determinant is outside PAL_INVERTED_LOW
- * h^3 to PAL_INVERTED_HIGH h^3, the whole body takes its forces from the five-tetrahedra split of the same nodes,
- * corotational with the averaged rotation of elastic_tet.h and a Poisson ratio of PAL_LOCK_FREE_POISSON at most. It
- * returns to cubes when all corners are within PAL_RECOVERED_LOW to _HIGH. Where a lasting load inverts cubes but
- * leaves the split whole, the two would alternate for ever: cubes that inverted again soon after a return are tried
- * again only when their corners are better than last time.
+ * Recovery from inversion (corotational and neo_hookean): recovery/recovery.h, by the determinants of the edges at all
+ * corners.
  *
  * Memory: the component's arena. Thread: [load] to make, then [sim]. */
 #ifndef PAL_SIM_ELEMENTS_ELASTIC_HEX_H
 #define PAL_SIM_ELEMENTS_ELASTIC_HEX_H
 #include "server/sim/core/force_cache.h"
-#include "server/sim/elements/elastic_tet.h"
+#include "server/sim/elements/elastic_law.h"
+#include "server/sim/recovery/recovery.h"
 
 typedef enum pal_hex_element { PAL_HEX_BBAR, PAL_HEX_FULL } pal_hex_element;
 
@@ -24,7 +21,7 @@ typedef struct pal_elastic_hexes {
     pal_elastic_law law;
     pal_hex_element element;
     bool fill, recover;
-    bool implicit; /* the solver linearises: inversion is checked then, else with every force */
+    bool implicit; /* the solver linearises */
     const pal_hexes *hexes;
     int n_hex, n_block;
     double edge_m;
@@ -44,15 +41,10 @@ typedef struct pal_elastic_hexes {
     const int32_t *entry_row;
     const pal_block_matrix *entry_of;
 
-    pal_force_cache force_cache; /* implicit: of the cubes, not of the split */
+    pal_force_cache force_cache; /* implicit: of the cubes, not of regions */
 
-    bool has_inversion;
-    int n_whole;          /* updates since the return to cubes, up to PAL_RETRY_UPDATES                           */
-    double tried, needed; /* smallest corner at that return; the one required for the next              */
-    uint64_t n_inversion,
-        n_switch;            /* updates with inversion; changes between cubes, split, single rotation; since reset */
-    pal_elastic_tets *split; /* NULL: recover is false or the law is linear */
-    float *split_fill;       /* [n_tet]                                       */
+    pal_recovery *recovery; /* NULL: recover is false or the law is linear                      */
+    double *whole[2];       /* with recovery: mu and lambda of all; mu, lambda are 0 in regions */
 } pal_elastic_hexes;
 
 typedef struct pal_hex_options {
@@ -65,10 +57,7 @@ typedef struct pal_hex_options {
 pal_err pal_hex_make(const pal_hex_options *options, pal_build *build, const char *path, pal_elastic_hexes *out);
 void pal_hex_material(pal_elastic_hexes *cubes, const pal_material *material);
 void pal_hex_reset(pal_elastic_hexes *cubes);
-/* no inversion, nothing tried yet */
-void pal_hex_recovery_reset(pal_elastic_hexes *cubes);
-/* examines all corners and chooses between cubes and split; true: it changed */
-bool pal_hex_recover(pal_elastic_hexes *cubes, const pal_body *body);
+pal_err pal_hex_recovery_make(pal_elastic_hexes *cubes, pal_build *build);       /* MEMORY */
 double pal_hex_min_corner(const pal_elastic_hexes *cubes, const pal_body *body); /* smallest corner determinant, h^3 */
 /* block pairs of corners: index of c <= d in `reference` and `entry` */
 static inline int pal_hex_pair(int c, int d)

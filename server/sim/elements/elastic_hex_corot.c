@@ -30,7 +30,7 @@ PAL_INLINE void rotation_force(pal_wide x[3][8], pal_wide g[3][8])
     for (int i = 0; i < 9; i++) f[i] = x[i / 3][1 << i % 3];
     pal_wide det = pal_wide_spin_cofactors(f, c, &trace);
     /* omitted where the rotation is nearly undefined: collapsed and inverted cubes */
-    pal_wide_mask good = (det > 1e-3 * (trace * trace * trace)) & (trace > 0);
+    pal_wide_mask good = (det > 1e-9 * (trace * trace * trace)) & (trace > 0);
     pal_wide_spin_solve(c, pal_wide_select(good, 1 + zero, zero) / pal_wide_select(good, det, 1 + zero), t, w);
     g[2][2] += w[0], g[1][4] -= w[0];
     g[0][4] += w[1], g[2][1] -= w[1];

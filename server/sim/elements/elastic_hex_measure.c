@@ -63,8 +63,8 @@ static void take_cube(const pal_elastic_hexes *cubes, const pal_body *body, int 
     double share = cubes->share[lane], centre[9] = {0}, q[4];
     *at = (cube){.bbar = cubes->element == PAL_HEX_BBAR,
                  .volume_m3 = share * h * h * h,
-                 .mu = cubes->mu[lane] * 16 / (h * share),
-                 .lambda = cubes->lambda[lane] * 16 / (h * share)};
+                 .mu = (cubes->recovery ? cubes->whole[0] : cubes->mu)[lane] * 16 / (h * share),
+                 .lambda = (cubes->recovery ? cubes->whole[1] : cubes->lambda)[lane] * 16 / (h * share)};
     for (int p = 0; p < 8; p++)
         for (int i = 0; i < 9; i++) {
             for (int c = 0; c < 8; c++) at->f[p][i] += 2 / h * body->d[3 * node[c] + i / 3] * grad[p][c][i % 3];

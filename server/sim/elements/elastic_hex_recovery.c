@@ -1,11 +1,6 @@
-/* Which bodies of voxel hexahedra run on their five-tetrahedra split (elastic_hex.h, "Recovery"). */
+/* What recovery (recovery/recovery.h) asks of voxel hexahedra: the ratio of volume of a cube is the determinant of the
+ * three edges at each of its corners over h^3. */
 #include "server/sim/elements/elastic_hex_simd.h"
-
-void pal_hex_recovery_reset(pal_elastic_hexes *cubes)
-{
-    cubes->has_inversion = false;
-    cubes->n_whole = PAL_RETRY_UPDATES, cubes->needed = cubes->tried = PAL_RECOVERED_LOW;
-}
 
 /* smallest and largest determinant of the three edges at a corner */
 PAL_INLINE void range_of_corners(const pal_block_view *v, int l, pal_wide *low, pal_wide *high)
@@ -28,10 +23,21 @@ PAL_INLINE void range_of_corners(const pal_block_view *v, int l, pal_wide *low, 
     *low = min, *high = max;
 }
 
-/* the same over all voxels, h^3 */
-static void corner_range(const pal_elastic_hexes *cubes, const pal_body *body, double *low, double *high)
+/* the determinant of the mean edges, that of F at the centre times h^3 */
+PAL_INLINE pal_wide det_of_middle(const pal_block_view *v, int l)
 {
-    const double volume = cubes->edge_m * cubes->edge_m * cubes->edge_m;
+    pal_wide u[3][8], f[9];
+    hex_modes(v, l, u);
+    for (int i = 0; i < 9; i++) f[i] = 0.25 * u[i / 3][1 << i % 3];
+    return pal_wide_det(f);
+}
+
+/* the ratios of all cubes: the least and the largest, and each to low, high [n_hex] and `middle` unless they are NULL
+ */
+static void find_ratios(const pal_elastic_hexes *cubes, const pal_body *body, double out[2], float *low, float *high,
+                        float *middle)
+{
+    const double inverse = 1 / (cubes->edge_m * cubes->edge_m * cubes->edge_m);
     pal_wide min = pal_wide_of(INFINITY), max = pal_wide_of(-INFINITY);
     pal_node_order_load(body->node_order, body->d);
     for (int b = 0; b < cubes->n_block; b++) {
@@ -43,39 +49,87 @@ static void corner_range(const pal_elastic_hexes *cubes, const pal_body *body, d
             pal_wide_mask live = pal_wide_load(cubes->share + PAL_LANES * b + l) > 0;
             min = pal_wide_select(live & (small < min), small, min);
             max = pal_wide_select(live & (large > max), large, max);
+            if (!low) continue;
+            const pal_wide centre = det_of_middle(&v, l);
+            for (int i = 0; i < PAL_WIDE; i++) {
+                const int e = cubes->hex[PAL_LANES * b + l + i];
+                if (e < 0) continue;
+                low[e] = (float)(inverse * small[i]), high[e] = (float)(inverse * large[i]);
+                middle[e] = (float)(inverse * centre[i]);
+            }
         }
     }
-    *low = INFINITY, *high = -INFINITY;
-    for (int l = 0; l < PAL_WIDE; l++) *low = fmin(*low, min[l] / volume), *high = fmax(*high, max[l] / volume);
+    out[0] = INFINITY, out[1] = -INFINITY;
+    for (int l = 0; l < PAL_WIDE; l++) out[0] = fmin(out[0], inverse * min[l]), out[1] = fmax(out[1], inverse * max[l]);
 }
 
 double pal_hex_min_corner(const pal_elastic_hexes *cubes, const pal_body *body)
 {
-    double low, high;
-    corner_range(cubes, body, &low, &high);
-    return low;
+    double ratio[2];
+    find_ratios(cubes, body, ratio, NULL, NULL, NULL);
+    return ratio[0];
 }
 
-bool pal_hex_recover(pal_elastic_hexes *cubes, const pal_body *body)
+static void range(void *self, const pal_body *body, double out[2])
 {
-    if (!cubes->split) return false;
-    double low, high;
-    corner_range(cubes, body, &low, &high);
-    const bool before = cubes->has_inversion;
-    if (before) {
-        cubes->has_inversion = low < cubes->needed || high > PAL_RECOVERED_HIGH;
-        if (!cubes->has_inversion) cubes->n_whole = 0, cubes->tried = low;
-    } else {
-        cubes->has_inversion = low < PAL_INVERTED_LOW || high > PAL_INVERTED_HIGH;
-        if (cubes->n_whole < PAL_RETRY_UPDATES) cubes->n_whole++;
+    find_ratios(self, body, out, NULL, NULL, NULL);
+}
+
+static void ratios(void *self, const pal_body *body, float *low, float *high, float *middle)
+{
+    double all[2];
+    find_ratios(self, body, all, low, high, middle);
+}
+
+static int edges(const void *self, int e, int32_t out[][2])
+{
+    const int32_t *node = ((const pal_elastic_hexes *)self)->hexes->node + 8 * (size_t)e;
+    int n = 0;
+    for (int c = 0; c < 8; c++)
+        for (int axis = 1; axis < 8; axis *= 2)
+            if (!(c & axis)) out[n][0] = node[c], out[n++][1] = node[c | axis];
+    return n;
+}
+
+/* mu here is that of the material times share and h / 16, and mu V = 16 h^2 of it; so is lambda */
+static double stiffness(const void *self, int e, int a, int b)
+{
+    const pal_elastic_hexes *cubes = self;
+    (void)a, (void)b;
+    const int lane = cubes->simd_blocks.place[e];
+    return pal_recovery_stiffness_N_m(16 * cubes->whole[0][lane], 16 * cubes->whole[1][lane], 12, 1);
+}
+
+static void act(void *self, const uint8_t *on)
+{
+    pal_elastic_hexes *cubes = self;
+    for (int e = 0; e < cubes->n_hex; e++) {
+        const int lane = cubes->simd_blocks.place[e];
+        cubes->mu[lane] = on[e] ? cubes->whole[0][lane] : 0;
+        cubes->lambda[lane] = on[e] ? cubes->whole[1][lane] : 0;
     }
-    if (cubes->has_inversion && !before) {
-        cubes->needed = cubes->n_whole < PAL_RETRY_UPDATES
-                            ? fmin(fmax(cubes->needed, cubes->tried) + PAL_INVERTED_LOW, PAL_RETRY_MAX)
-                            : PAL_RECOVERED_LOW;
-        pal_elastic_tets_reset(cubes->split);
-    }
-    cubes->n_inversion += cubes->has_inversion;
-    cubes->n_switch += cubes->has_inversion != before;
-    return cubes->has_inversion != before;
+    pal_force_cache_invalidate(&cubes->force_cache);
+}
+
+static double energy(void *self, const pal_body *body)
+{
+    pal_elastic_hexes *cubes = self;
+    pal_node_order_load(body->node_order, body->d);
+    return (cubes->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_run : pal_hex_corot_run)(cubes, body->node_order,
+                                                                                     PAL_RUN_ENERGY);
+}
+
+pal_err pal_hex_recovery_make(pal_elastic_hexes *cubes, pal_build *build)
+{
+    const pal_recovery_model model = {.self = cubes,
+                                      .n_element = cubes->n_hex,
+                                      .edges = edges,
+                                      .stiffness_N_m = stiffness,
+                                      .range = range,
+                                      .ratios = ratios,
+                                      .act = act,
+                                      .energy = energy};
+    const size_t n = (size_t)cubes->n_block * PAL_LANES;
+    if (!PAL_NEW_DOUBLES(build->arena, n, &cubes->whole[0], &cubes->whole[1])) return PAL_ERR_MEMORY;
+    return pal_recovery_make(&model, build->body->n_node, build->body->node_rest, build->arena, &cubes->recovery);
 }

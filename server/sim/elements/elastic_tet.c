@@ -73,7 +73,7 @@ pal_err pal_elastic_tets_make(const pal_elastic_tets_options *options, pal_build
 {
     const pal_body *body = build->body;
     *out =
-        (pal_elastic_tets){.options = *options, .n_node = body->n_node, .x_rest = body->x_rest, .fixed = body->support};
+        (pal_elastic_tets){.options = *options, .n_node = body->n_node, .x_rest = body->x_rest, .edge_m = body->edge_m};
     out->n_point = options->n_corner == 4 ? 1 : 4;
     make_shape(out);
     PAL_TRY(make_lanes(out, build));
@@ -85,19 +85,16 @@ pal_err pal_elastic_tets_make(const pal_elastic_tets_options *options, pal_build
     out->rotation = PAL_NEW(build->arena, double, 4 * n_lane);
     out->tangent = PAL_NEW(build->arena, double, (size_t)n_keep *n_lane);
     out->bound = PAL_NEW(build->arena, double, body->n_node);
-    out->inverted = PAL_NEW(build->arena, int32_t, n_lane);
     out->entry = PAL_NEW(build->arena, int32_t, (size_t)entries(options->n_corner) * (size_t)options->n_tet);
-    out->flag = PAL_NEW(build->arena, uint8_t, options->n_tet);
-    if (options->recover) out->around = PAL_NEW(build->arena, double, 9 * body->n_node);
-    if (options->recover) out->x_before = PAL_NEW(build->arena, double, 3 * body->n_node);
     if (!out->inverse || !out->volume_m3 || !out->stiff || !out->rotation || !out->tangent || !out->bound ||
-        !out->inverted || !out->entry || !out->flag || (options->recover && (!out->around || !out->x_before)))
+        !out->entry)
         return PAL_ERR_MEMORY;
     PAL_TRY(pal_elastic_regions_make(build, options->tet, options->n_tet, options->n_corner, 4, &out->parts));
     take_rest(out, body->edge_m);
     pal_elastic_tets_reset(out);
     pal_elastic_tets_material(out, &build->def->material);
-    return PAL_ERR_OK;
+    const bool recovers = options->recover && options->law != PAL_LAW_LINEAR;
+    return recovers ? pal_tet_recovery_make(out, build) : PAL_ERR_OK;
 }
 
 void pal_elastic_tets_reset(pal_elastic_tets *t)
@@ -105,8 +102,8 @@ void pal_elastic_tets_reset(pal_elastic_tets *t)
     memset(t->rotation, 0, 4 * sizeof(double) * PAL_LANES * (size_t)t->n_block);
     for (int b = 0; b < t->n_block; b++)
         for (int l = 0; l < PAL_LANES; l++) t->rotation[(size_t)b * 4 * PAL_LANES + (size_t)l] = 1;
-    t->n_inverted = t->n_still = 0;
-    t->single_rotation = false;
+    t->n_inverted = 0;
+    if (t->recovery) pal_recovery_reset(t->recovery);
 }
 
 /* dN_a/dl at a Gauss point times m: gradients by X for m = dl/dX */
@@ -147,16 +144,17 @@ static void bound_at_rest(pal_elastic_tets *t, int e, double *bound)
 
 void pal_elastic_tets_material(pal_elastic_tets *t, const pal_material *material)
 {
-    const double nu = t->options.max_poisson;
     memset(t->bound, 0, sizeof(double) * (size_t)t->n_node);
     for (int e = 0; e < t->options.n_tet; e++) {
         double mu, lambda, volume = *pal_lane(t->volume_m3, 1, t->place[e], 0);
         pal_elastic_regions_lame(&t->parts, material, e, &mu, &lambda);
-        if (nu > 0) lambda = fmin(lambda, 2 * mu * nu / (1 - 2 * nu));
         *pal_lane(t->stiff, 2, t->place[e], 0) = volume * mu;
         *pal_lane(t->stiff, 2, t->place[e], 1) = volume * lambda;
         bound_at_rest(t, e, t->bound);
     }
+    if (!t->recovery) return;
+    memcpy(t->whole, t->stiff, 2 * PAL_LANES * sizeof *t->whole * (size_t)t->n_block);
+    pal_recovery_refresh(t->recovery);
 }
 
 /* K_ab = mu g_a.g_b I + s [F (g_a x g_b)]x + k1 (C g_a)(C g_b)', C = dJ/dF, s = -mu + k1 (J - 1) */
@@ -281,7 +279,6 @@ static void assemble_modes(const pal_elastic_tets *t, int e, double k, pal_block
 void pal_elastic_tets_assemble(pal_elastic_tets *t, double k, pal_block_matrix *to)
 {
     if (t->entry_row != to->row || t->entry_of != to) find_entries(t, to);
-    if (t->single_rotation) k *= t->soft;
     for (int e = 0; e < t->options.n_tet; e++) {
         if (*pal_lane(t->volume_m3, 1, t->place[e], 0) <= 0) continue;
         if (t->options.law == PAL_LAW_NEO_HOOKEAN)
@@ -308,7 +305,7 @@ static double field_at(const pal_elastic_tets *t, int e, int point, const double
 {
     double volume = *pal_lane(t->volume_m3, 1, t->place[e], 0);
     double mu, lambda;
-    pal_tet_stiffness(t, e, &mu, &lambda);
+    pal_tet_whole_stiffness(t, e, &mu, &lambda);
     mu /= volume, lambda /= volume;
     double f[9], r[9], p[9], s[9];
     pal_elastic_tets_gradient(t, e, point, d, f);
@@ -351,13 +348,15 @@ void pal_elastic_tets_stress(pal_elastic_tets *t, const double *d, pal_stress_ta
     for (int p = 0; p < t->n_point && n == 10; p++) pal_tet10_shape(pal_tet_gauss[p], shape[p], NULL);
     for (int e = 0; e < t->options.n_tet; e++) {
         double volume = *pal_lane(t->volume_m3, 1, t->place[e], 0), f[9], r[9], p[9];
+        double mu, lambda;
         if (volume <= 0) continue;
+        pal_tet_whole_stiffness(t, e, &mu, &lambda);
         pal_stress_point to = {.element = e,
                                .n_corner = n,
                                .node = t->corner + (size_t)n * (size_t)e,
                                .volume_m3 = volume / t->n_point,
-                               .mu_Pa = *pal_lane(t->stiff, 2, t->place[e], 0) / volume,
-                               .lambda_Pa = *pal_lane(t->stiff, 2, t->place[e], 1) / volume};
+                               .mu_Pa = mu / volume,
+                               .lambda_Pa = lambda / volume};
         bool neo = t->options.law == PAL_LAW_NEO_HOOKEAN;
         pal_elastic_tets_rotation(t, e, r);
         for (int k = 0; k < t->n_point; k++) {

@@ -83,12 +83,4 @@ PAL_INLINE void pal_tet_constants(const pal_elastic_tets *t, int b, int lane, do
 
 /* neo_hookean: the tangent at d. [sim] */
 void pal_elastic_tets_modes(pal_elastic_tets *t, const double *d);
-/* one element of a corotational law with the rotation it holds: returns its energy; force (NULL: none) [n_node][3] and
- * torque about the origin are added to */
-double pal_tet_add_element(const pal_elastic_tets *t, int e, const double *d, double *force, double *torque);
-/* f -= forces without resultant that have this torque: balances averaged rotations */
-void pal_tet_balance_torque(const pal_elastic_tets *t, const double *d, const double torque[3], double *f);
-/* energy and forces of a body with a single rotation */
-double pal_tet_single_rotation_force(const pal_elastic_tets *t, const double *d, double *f);
-void pal_tet_fit_single_rotation(pal_elastic_tets *t, const double *d);
 #endif

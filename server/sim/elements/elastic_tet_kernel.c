@@ -7,8 +7,6 @@
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
 #include "server/num/shape_functions.h"
-#include "server/sim/core/best_rotation.h"
-#include "server/sim/core/rigid_motion.h"
 #include "server/sim/elements/elastic_tet_block.h"
 
 #include <string.h>
@@ -23,30 +21,31 @@ PAL_INLINE void stress(pal_wide mu, pal_wide lambda, const pal_wide a[9], pal_wi
     s[5] = s[7] = mu * (a[5] + a[7]);
 }
 
-/* F at the centre, and for ten nodes at the Gauss points; the elements that are inverted at any of them */
+PAL_INLINE pal_wide_mask is_bad(pal_wide ratio)
+{
+    return (ratio < PAL_INVERTED_LOW) | (ratio > PAL_INVERTED_HIGH);
+}
+
+/* F at the centre, and for ten nodes at the Gauss points; the elements with a bad ratio of volume at any of them */
 PAL_INLINE pal_wide_mask take_gradient(const pal_elastic_tets *t, int n_corner, const pal_block_view *at, int lane,
                                        const pal_wide inverse[9], pal_wide f[9], pal_wide inner[4][9])
 {
     pal_wide h[9];
     pal_tet_local_gradient(t, n_corner, PAL_TET_CENTRE, at, lane, h);
     pal_wide_mul(f, h, inverse);
-    pal_wide_mask inverted = pal_wide_det(f) <= 0;
+    pal_wide_mask inverted = is_bad(pal_wide_det(f));
     for (int g = 0; g < 4 && n_corner > 4; g++) {
         pal_tet_local_gradient(t, n_corner, g, at, lane, h);
         pal_wide_mul(inner[g], h, inverse);
-        inverted |= pal_wide_det(inner[g]) <= 0;
+        inverted |= is_bad(pal_wide_det(inner[g]));
     }
     return inverted;
 }
 
-/* records inverted elements; those with an averaged rotation receive no force yet: their lanes leave `live` */
-PAL_INLINE pal_wide_mask note_inverted(pal_elastic_tets *t, int first_lane, pal_wide_mask inverted, pal_wide_mask live)
+static void note_inverted(pal_elastic_tets *t, pal_wide_mask inverted)
 {
-    inverted &= live;
-    if (pal_wide_all(~inverted)) return live;
-    for (int l = 0; l < PAL_WIDE; l++)
-        if (inverted[l]) t->inverted[t->n_inverted++] = t->owner[first_lane + l];
-    return t->options.recover && t->options.law == PAL_LAW_COROTATIONAL ? live & ~inverted : live;
+    if (pal_wide_all(~inverted)) return;
+    for (int l = 0; l < PAL_WIDE; l++) t->n_inverted += inverted[l] != 0;
 }
 
 /* s = R [y] D', y = A^-1 t, A = tr(m) I - m for symmetric m = R'F at the centre: what the change of the rotation adds
@@ -57,7 +56,7 @@ PAL_INLINE void rotation_stress(const pal_wide r[9], const pal_wide m[9], const 
     const pal_wide zero = {0};
     pal_wide c[6], sum, y[3], det = pal_wide_spin_cofactors(m, c, &sum);
     /* omitted where the rotation is nearly undefined */
-    pal_wide_mask good = (m[4] + m[8] > 0) & (c[5] > 0) & (det > 1e-3 * sum * sum * sum);
+    pal_wide_mask good = (m[4] + m[8] > 0) & (c[5] > 0) & (det > 1e-9 * sum * sum * sum);
     pal_wide_spin_solve(c, pal_wide_select(good, 1 + zero, zero) / pal_wide_select(good, det, 1 + zero), t, y);
     pal_wide_spin_stress(r, y, inverse, s);
 }
@@ -102,18 +101,17 @@ PAL_INLINE pal_wide rotated_stress(const pal_elastic_tets *t, int n_corner, bool
 PAL_INLINE pal_wide corotational_half(pal_elastic_tets *t, int n_corner, bool linear, pal_element_run what, int b,
                                       int lane, pal_block_view *at)
 {
-    const pal_wide zero = {0};
     pal_wide f[9], inner[4][9], r[9], m[9], inverse[9], stiff[2];
     pal_tet_constants(t, b, lane, 1, inverse, stiff);
     pal_wide_mask live = stiff[0] > 0;
     pal_wide_mask inverted = take_gradient(t, n_corner, at, lane, inverse, f, inner);
-    pal_wide_mask asked = note_inverted(t, PAL_LANES * b + lane, inverted, live);
+    note_inverted(t, inverted & live);
     if (linear)
         memcpy(m, f, sizeof m);
     else
         pal_wide_take_rotation(t->rotation + (size_t)b * 4 * PAL_LANES + lane, live, f, r, m);
     double share = n_corner == 4 ? 1 : 0.25;
-    for (int i = 0; i < 2; i++) stiff[i] = share * pal_wide_select(asked, stiff[i], zero);
+    stiff[0] *= share, stiff[1] *= share;
     return rotated_stress(t, n_corner, linear, what, lane, inverse, stiff[0], stiff[1], r, m, inner, at);
 }
 
@@ -129,7 +127,7 @@ PAL_INLINE pal_wide neo_half(pal_elastic_tets *t, int n_corner, pal_element_run 
     for (int g = 0; g < n_point; g++) {
         pal_tet_local_gradient(t, n_corner, g, at, lane, h);
         pal_wide_mul(f, h, inverse);
-        inverted |= pal_wide_det(f) <= 0;
+        inverted |= is_bad(pal_wide_det(f));
         /* in a = F - I, so that small strains do not drown in J - 1 (elastic_law.c) */
         f[0] -= 1, f[4] -= 1, f[8] -= 1;
         pal_wide third = pal_wide_cofactors(f, c), trace = f[0] + f[4] + f[8], second = c[0] + c[4] + c[8],
@@ -148,7 +146,7 @@ PAL_INLINE pal_wide neo_half(pal_elastic_tets *t, int n_corner, pal_element_run 
         pal_wide_mult(f, c, inverse);
         pal_tet_add_force(t, n_corner, g, at, lane, f);
     }
-    note_inverted(t, PAL_LANES * b + lane, inverted, live);
+    note_inverted(t, inverted & live);
     return sum;
 }
 
@@ -170,7 +168,7 @@ PAL_INLINE double all_blocks(pal_elastic_tets *t, int n_corner, pal_elastic_law 
     return sum;
 }
 
-/* the kernels; rotations and the list of inverted elements are taken on the way */
+/* the kernels; rotations and the number of inverted elements are taken on the way */
 static double run_blocks(pal_elastic_tets *t, pal_element_run what, const double *x, double *force)
 {
     t->n_inverted = 0;
@@ -201,7 +199,7 @@ static void rotate_blocks(pal_elastic_tets *t, const double *x)
             pal_wide f[9], inner[4][9], r[9], m[9], inverse[9], stiff[2];
             pal_tet_constants(t, b, lane, 1, inverse, stiff);
             pal_wide_mask live = stiff[0] > 0;
-            note_inverted(t, PAL_LANES * b + lane, take_gradient(t, n_corner, &at, lane, inverse, f, inner), live);
+            note_inverted(t, take_gradient(t, n_corner, &at, lane, inverse, f, inner) & live);
             if (t->options.law != PAL_LAW_LINEAR)
                 pal_wide_take_rotation(t->rotation + (size_t)b * 4 * PAL_LANES + lane, live, f, r, m);
         }
@@ -230,97 +228,12 @@ void pal_elastic_tets_gradient(const pal_elastic_tets *t, int e, int point, cons
         }
 }
 
-/* force, its torque about the origin, and energy of a corotational element with its present rotation */
-double pal_tet_add_element(const pal_elastic_tets *t, int e, const double *d, double *force, double *torque)
-{
-    double r[9], f[9], p[9], sum = 0;
-    pal_elastic_tets_rotation(t, e, r);
-    double share = (t->single_rotation ? t->soft : 1) / t->n_point, mu, lambda;
-    pal_tet_stiffness(t, e, &mu, &lambda);
-    const int32_t *node = t->corner + (size_t)t->options.n_corner * (size_t)e;
-    for (int g = 0; g < t->n_point; g++) {
-        pal_elastic_tets_gradient(t, e, g, d, f);
-        sum += pal_corotational_stress(share * mu, share * lambda, f, r, p);
-        if (!force) continue;
-        for (int k = 0; k < 3; k++) { /* of x and f: -F P' */
-            int i = (k + 1) % 3, j = (k + 2) % 3;
-            torque[k] += pal_dot3(f + 3 * j, p + 3 * i) - pal_dot3(f + 3 * i, p + 3 * j);
-        }
-        for (int a = 0; a < t->options.n_corner; a++)
-            for (int c = 0; c < 3; c++)
-                for (int m = 0; m < 3; m++)
-                    for (int k = 0; k < 3; k++)
-                        force[3 * node[a] + k] -=
-                            p[3 * k + m] * *pal_lane(t->inverse, 9, t->place[e], 3 * c + m) * t->shape[g][a][c];
-    }
-    return sum;
-}
-
-/* f -= forces a x r at the nodes, r from the mean, which have this torque and no resultant: they balance averaged
- * rotations */
-void pal_tet_balance_torque(const pal_elastic_tets *t, const double *d, const double torque[3], double *f)
-{
-    double mean[3] = {0}, s[9], r[3], a[3];
-    for (int i = 0; i < t->n_node; i++) pal_axpy3(mean, 1.0 / t->n_node, d + 3 * i);
-    pal_sum_pairs(t->n_node, NULL, d, d, s);
-    double trace = s[0] + s[4] + s[8];
-    if (!(trace > 0 && trace < INFINITY)) return;
-    for (int k = 0; k < 9; k++) s[k] = (k % 4 == 0 ? trace : 0) - s[k];
-    pal_rigid_spin(s, torque, 0, a);
-    for (int i = 0; i < t->n_node; i++) {
-        pal_sub3(r, d + 3 * i, mean);
-        pal_cross3(r, a, r);
-        pal_axpy3(f + 3 * i, -1, r);
-    }
-}
-
-/* averaged rotations: around nodes from the elements that are not inverted, then of the others */
-static void recover(pal_elastic_tets *t)
-{
-    memset(t->around, 0, 9 * sizeof(double) * (size_t)t->n_node);
-    for (int i = 0; i < t->n_inverted; i++) t->flag[t->inverted[i]] = 1;
-    for (int e = 0; e < t->options.n_tet; e++) {
-        double r[9], volume = *pal_lane(t->volume_m3, 1, t->place[e], 0);
-        if (t->flag[e] || volume <= 0) continue;
-        pal_elastic_tets_rotation(t, e, r);
-        for (int c = 0; c < 4; c++)
-            for (int i = 0; i < 9; i++) t->around[9 * t->corner[t->options.n_corner * e + c] + i] += volume * r[i];
-    }
-    for (int k = 0; k < t->n_inverted; k++) {
-        int e = t->inverted[k];
-        double sum[9] = {0}, q[4], max = 0;
-        t->flag[e] = 0;
-        for (int c = 0; c < 4; c++) {
-            /* a node is weighted by its rotation, not by the volume around it */
-            const double *a = t->around + 9 * t->corner[t->options.n_corner * e + c];
-            double length = 0;
-            for (int i = 0; i < 9; i++) length += a[i] * a[i];
-            for (int i = 0; i < 9 && length > 0; i++) sum[i] += a[i] / sqrt(length);
-        }
-        for (int i = 0; i < 9; i++) max = fmax(max, fabs(sum[i]));
-        if (!(max > 1e-9)) continue;
-        for (int i = 0; i < 4; i++) q[i] = *pal_lane(t->rotation, 4, t->place[e], i);
-        pal_polar_rotation(sum, q, PAL_POLAR_STEPS_MAX);
-        for (int i = 0; i < 4; i++) *pal_lane(t->rotation, 4, t->place[e], i) = q[i];
-    }
-}
-
-static bool has_inversion(const pal_elastic_tets *t)
-{
-    return t->n_inverted > 0 && t->options.recover && t->options.law == PAL_LAW_COROTATIONAL;
-}
-
 static double take(pal_elastic_tets *t, pal_element_run what, const double *d, double *f)
 {
-    bool node_order = t->options.n_corner == 4;
-    if (t->single_rotation) return pal_tet_single_rotation_force(t, d, f);
+    const bool node_order = t->options.n_corner == 4;
     if (node_order) pal_node_order_load(t->node_order, d);
-    double sum = run_blocks(t, what, d, f), torque[3] = {0};
+    double sum = run_blocks(t, what, d, f);
     if (node_order && f) pal_node_order_add(t->node_order, f);
-    if (!has_inversion(t)) return sum;
-    recover(t);
-    for (int i = 0; i < t->n_inverted; i++) sum += pal_tet_add_element(t, t->inverted[i], d, f, torque);
-    if (f) pal_tet_balance_torque(t, d, torque, f);
     return sum;
 }
 
@@ -332,6 +245,12 @@ void pal_elastic_tets_force(pal_elastic_tets *t, const double *d, double *f)
 double pal_elastic_tets_energy(pal_elastic_tets *t, const double *d, double *f)
 {
     return take(t, f ? PAL_RUN_BOTH : PAL_RUN_ENERGY, d, f);
+}
+
+void pal_elastic_tets_count(pal_elastic_tets *t, const double *d)
+{
+    if (t->options.n_corner == 4) pal_node_order_load(t->node_order, d);
+    rotate_blocks(t, d);
 }
 
 /* D R' of every element */
@@ -350,12 +269,7 @@ static void take_gradients(pal_elastic_tets *t)
 
 void pal_elastic_tets_linearise(pal_elastic_tets *t, const double *d)
 {
-    if (t->options.n_corner == 4) pal_node_order_load(t->node_order, d);
-    if (t->single_rotation)
-        pal_tet_fit_single_rotation(t, d);
-    else
-        rotate_blocks(t, d);
-    if (has_inversion(t) && !t->single_rotation) recover(t);
+    pal_elastic_tets_count(t, d);
     if (t->options.law == PAL_LAW_NEO_HOOKEAN)
         pal_elastic_tets_modes(t, d);
     else
@@ -422,7 +336,6 @@ PAL_INLINE void multiply_blocks(const pal_elastic_tets *t, int n_corner, bool ne
 void pal_elastic_tets_multiply(const pal_elastic_tets *t, double k, const double *p, double *out)
 {
     const bool neo = t->options.law == PAL_LAW_NEO_HOOKEAN, four = t->options.n_corner == 4;
-    if (t->single_rotation) k *= t->soft;
     if (four) pal_node_order_load(t->node_order, p);
     if (four && neo)
         multiply_blocks(t, 4, true, k, p, out);

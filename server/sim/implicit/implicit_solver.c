@@ -432,11 +432,15 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
         if (max > core->options.newton) body->safeguards.ns += pal_clock_ns() - again_ns;
         if (!rises(core, 0)) return PAL_ERR_OK;
         core->energy_rose = max == PAL_SAFEGUARD_NEWTON;
-        if (core->energy_rose) return PAL_ERR_OK;
+        /* the last iteration too ends where a search does, unless it hardly gains */
+        if (core->energy_rose && !rises(core, PAL_SOLVER_TOLERANCE)) return PAL_ERR_OK;
         again_ns = pal_clock_ns();
         body->safeguards.n_search++;
         line_search(core, tau);
-        max++;
+        if (max++ < PAL_SAFEGUARD_NEWTON) continue;
+        core->energy_rose = rises(core, 0);
+        body->safeguards.ns += pal_clock_ns() - again_ns;
+        return PAL_ERR_OK;
     }
 }
 

@@ -79,8 +79,9 @@ typedef struct static_newton {
     pal_solve_report report;
 } static_newton;
 
-/* iterations with the tangent alone after the true stiffness failed */
-enum { BACKOFF = 4 };
+/* iterations with the tangent alone after the true stiffness failed; solves of a step in which elements act again that
+ * were inverted */
+enum { BACKOFF = 4, RECOVERIES_MAX = 8 };
 
 /* ---- load ---- */
 
@@ -545,12 +546,19 @@ static pal_err run(void *self, pal_step *step)
         else
             pal_set3(body->v + 3 * i, 0, 0, 0);
     }
+    pal_body_update_nodes(body);
+    step->finds_balance = true;
     pal_system_linearise_contact(&solver->system, step);
-    bool bad = false;
+    bool bad = false, again = pal_guard_recover(step) & PAL_INVERTED;
     do PAL_TRY(solve(solver, step, &bad));
     while (
         solver->system.n_free > 0 && !bad &&
         pal_system_settle_contact(&solver->system, step, solver->x0, solver->move, solver->node_displacement_m, true));
+    /* elements that are no longer inverted act again, and the balance is another one */
+    for (int k = 0; k < RECOVERIES_MAX && again && solver->system.n_free > 0 && !bad; k++) {
+        again = pal_guard_recover(step) & PAL_INVERSION_CHANGED;
+        if (again) PAL_TRY(solve(solver, step, &bad));
+    }
     return PAL_ERR_OK;
 }
 

@@ -1,6 +1,7 @@
 /* Transfer of a world (transfer_world.h). */
 #include "server/sim/transfer/transfer_world.h"
 
+#include "server/sim/recovery/recovery.h"
 #include "server/sim/springs/spring_recovery.h"
 #include "server/sim/world/world_core.h"
 
@@ -79,6 +80,35 @@ static void transfer_body(pal_world *w, int b, const pal_body *from, const doubl
     pal_world_invalidate_limits(w, b);
 }
 
+static pal_recovery *find_recovery(const pal_world *w, int b)
+{
+    const pal_component *force = w->plan.component + w->plan.first[PAL_STAGE_FORCE][b];
+    pal_recovery *found = NULL;
+    for (int i = 0; i < w->plan.n_of[PAL_STAGE_FORCE][b] && !found; i++)
+        if (force[i].effect->recovery.state) found = force[i].effect->recovery.state(force[i].self);
+    return found;
+}
+
+/* Recovery goes on where a body has the same elements, as at a switch of its supports. Other elements that are inverted
+ * are found at once, so that what follows sees the forces of the next step */
+static void transfer_recovery(pal_world *w, int b, const pal_world *before)
+{
+    pal_body *to = &w->plan.body[b];
+    const pal_body *from = &before->plan.body[b];
+    pal_recovery *of[2] = {find_recovery(w, b), find_recovery(before, b)};
+    if (!of[0] || !pal_recovery_acts(of[1])) return;
+    if (to->n_node == from->n_node &&
+        !memcmp(to->node_rest, from->node_rest, 3 * sizeof(double) * (size_t)to->n_node)) {
+        pal_recovery_transfer(of[0], of[1]);
+        return;
+    }
+    pal_step step = {.body = to,
+                     .force = w->plan.component + w->plan.first[PAL_STAGE_FORCE][b],
+                     .n_force = w->plan.n_of[PAL_STAGE_FORCE][b],
+                     .time_s = w->time_s};
+    (void)pal_recovery_update(of[0], &step);
+}
+
 void pal_world_transfer(pal_world *world, const pal_world *before, int edited, const double *x, const double *v)
 {
     pal_world *w = world;
@@ -102,6 +132,7 @@ void pal_world_transfer(pal_world *world, const pal_world *before, int edited, c
         }
         if (adaptive || same) pal_world_transfer_loads(w, b, from, NULL);
         transfer_body(w, b, from, same ? from->x : other ? NULL : x, same ? from->v : other ? NULL : v);
+        transfer_recovery(w, b, before);
     }
     pal_world_show_all(w);
 }

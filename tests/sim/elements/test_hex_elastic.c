@@ -647,10 +647,6 @@ static void bad_entries_are_refused(void)
     CHECK(hex_body_make(&b) == PAL_ERR_REFUSED);
     CHECK(strstr(b.diag.text, "gauss") != NULL);
     hex_body_free(&b);
-    begin(&b, 2, 2, 2, NULL, "hex8_bbar", "corotational");
-    b.tets.n_tet--;
-    CHECK(hex_body_make(&b) == PAL_ERR_REFUSED);
-    hex_body_free(&b);
 }
 
 int main(void)
