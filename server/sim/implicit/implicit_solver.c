@@ -528,29 +528,6 @@ static void update_probed(pal_implicit *core, pal_step *step)
         (void)pal_compliance_solver_factor(&core->compliance, &core->blocks, true);
 }
 
-/* forces that have no energy, such as those of inverted elements with fallback rotations, may gain energy in a cycle
- * for ever; an inverted body needs a few such sub-steps to recover */
-static bool is_cycling(pal_implicit *core, double dt_s)
-{
-    const double limit_s = PAL_ENERGY_RISE_S * (1 + 1e-9);
-    core->steady_s = core->energy_rose ? 0 : core->steady_s + dt_s;
-    if (core->energy_rose) core->energy_rise_s += dt_s;
-    if (core->steady_s > limit_s) core->energy_rise_s = 0;
-    return core->energy_rose && core->energy_rise_s > limit_s;
-}
-
-/* the body stops where it was; a body without supports keeps its momentum */
-static void stop(pal_implicit *core, double dt_s)
-{
-    pal_body *body = core->system.body;
-    double mean[3];
-    free_mean(core, body->v, NULL, mean);
-    for (int i = 0; i < body->n_dof; i++) {
-        for (int c = 0; c < 3; c++) body->x[3 * i + c] = core->x0[3 * i + c] + dt_s * mean[c];
-        pal_copy3(body->v + 3 * i, mean);
-    }
-}
-
 void pal_implicit_end(pal_implicit *core, pal_step *step)
 {
     pal_body *body = core->system.body;
@@ -560,7 +537,7 @@ void pal_implicit_end(pal_implicit *core, pal_step *step)
         pal_body_update_nodes(body);
         return;
     }
-    if (!body->mass_operator && is_cycling(core, step->dt_s)) stop(core, step->dt_s);
+    core->rose_s = core->energy_rose ? PAL_ENERGY_RISE_S : fmax(0, core->rose_s - step->dt_s);
     pal_body_update_nodes(body);
     pal_warp_step(&core->warp, step->dt_s);
     pal_warp_step(&core->compliance.warp, step->dt_s);
@@ -612,7 +589,7 @@ void pal_implicit_reset(void *self, const pal_body *body)
 {
     pal_implicit *core = self;
     (void)body;
-    core->energy_rise_s = core->steady_s = 0;
+    core->rose_s = 0;
     if (core->system.n_free == 0) return;
     pal_node_rotations_reset(&core->rotations);
     pal_compliance_solver_reset(&core->compliance);

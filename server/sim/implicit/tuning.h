@@ -14,9 +14,8 @@
 /* of 10 E h^2 (load_cap_N), the same for a body without loads: such forces move a node by the rounding of positions
  * (tests/stability/test_rest_after_cases.c) */
 #define PAL_UNLOADED_FLOOR 1e-11
-/* s, total of sub-steps that gained energy in spite of all iterations, before the body has to stop in such: an inverted
- * body needs a few of them to recover. They are forgotten after as much time without one
- * (tests/stability/test_fem_cases.c) */
+/* s after a sub-step that gained energy in spite of all iterations in which sdirk2 takes backward Euler: a crushed body
+ * gains in one of thirty sub-steps (tests/stability/test_fem_shapes.c) */
 #define PAL_ENERGY_RISE_S 0.5
 /* s, simulated, between two refreshed factors: each takes the spare thread and a copy of the matrix
  * (tests/sim/solvers/test_solve_report.c) */
