@@ -55,7 +55,7 @@ static double energy(void *self, const pal_body *body)
 {
     pal_elastic_hexes *row = self;
     pal_recovery_select(row->recovery, body);
-    return elements_energy(row, body) + pal_recovery_energy(row->recovery, body->d, NULL, NULL);
+    return elements_energy(row, body) + pal_recovery_energy(row->recovery, body->d, NULL);
 }
 
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)

@@ -68,7 +68,7 @@ static double energy(void *self, const pal_body *body)
 {
     tet_row *row = self;
     pal_recovery_select(row->whole.recovery, body);
-    return elements_energy(row, body->d) + pal_recovery_energy(row->whole.recovery, body->d, NULL, NULL);
+    return elements_energy(row, body->d) + pal_recovery_energy(row->whole.recovery, body->d, NULL);
 }
 
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)

@@ -525,6 +525,7 @@ static void update_probed(pal_implicit *core, pal_step *step)
         (void)pal_compliance_solver_factor(&core->compliance, &core->blocks, true);
 }
 
+<<<<<<< HEAD
 /* forces that have no energy, such as those of inverted elements with fallback rotations, may gain energy in a cycle
  * for ever; an inverted body needs a few such sub-steps to recover */
 static bool is_cycling(pal_implicit *core, double dt_s)
@@ -548,6 +549,8 @@ static void stop(pal_implicit *core, double dt_s)
     }
 }
 
+=======
+>>>>>>> recovery
 void pal_implicit_end(pal_implicit *core, pal_step *step)
 {
     pal_body *body = core->system.body;
@@ -557,7 +560,7 @@ void pal_implicit_end(pal_implicit *core, pal_step *step)
         pal_body_update_nodes(body);
         return;
     }
-    if (!body->mass_operator && is_cycling(core, step->dt_s)) stop(core, step->dt_s);
+    core->rose_s = core->energy_rose ? PAL_ENERGY_RISE_S : fmax(0, core->rose_s - step->dt_s);
     pal_body_update_nodes(body);
     pal_warp_step(&core->warp, step->dt_s);
     pal_warp_step(&core->compliance.warp, step->dt_s);
@@ -609,7 +612,7 @@ void pal_implicit_reset(void *self, const pal_body *body)
 {
     pal_implicit *core = self;
     (void)body;
-    core->energy_rise_s = core->steady_s = 0;
+    core->rose_s = 0;
     if (core->system.n_free == 0) return;
     pal_node_rotations_reset(&core->rotations);
     pal_compliance_solver_reset(&core->compliance);

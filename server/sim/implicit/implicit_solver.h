@@ -8,9 +8,7 @@
  * rotations of that state the quadratic that is solved bounds the corotational energy (except its volume term) from
  * above, so a single iteration (newton 1, the default) seldom gains energy. Where it does, up to 7 more iterations
  * follow, each with a line search on the incremental potential, until the energy is no more than at the beginning of
- * the sub-step. A body that gains energy in spite of them for a total of half a second, without an interval of half
- * a second free of gains, is in a cycle, as crushed elements with averaged rotations are. From then on each such
- * sub-step is undone and the velocity set to zero, so that the energy cannot rise.
+ * the sub-step. The last one ends where a search does, unless it gains less than the error of a solve.
  *
  * Contact gives its loads at the beginning of the sub-step; its stiffness acts on the motion since then,
  * and `settle` brings the forces on tools to the end of the sub-step. Fixed nodes move with body->v (0 unless
@@ -55,12 +53,11 @@ typedef struct pal_implicit {
     bool guarded;                /* energy is checked, see above */
     bool sound;                  /* the last check found x and v finite */
     bool energy_rose;            /* the energy rose in this sub-step */
-    double energy_rise_s,
-        steady_s;     /* total time of such sub-steps (0 after half a second without one); time since the last */
-    int max_cg;       /* max iterations in one solve of this sub-step */
-    uint64_t sampled; /* material revision of the body at the factor (dofs.h) */
-    bool probing;     /* the matrices of an interpolated body are being rebuilt */
-    double probes;    /* columns that may be found now */
+    double rose_s;               /* what is left of PAL_ENERGY_RISE_S since the last such sub-step */
+    int max_cg;                  /* max iterations in one solve of this sub-step */
+    uint64_t sampled;            /* material revision of the body at the factor (dofs.h) */
+    bool probing;                /* the matrices of an interpolated body are being rebuilt */
+    double probes;               /* columns that may be found now */
     pal_solve_report report;
 } pal_implicit;
 

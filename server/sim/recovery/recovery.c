@@ -5,7 +5,6 @@
 #include "server/base/vec3.h"
 #include "server/num/union_find.h"
 #include "server/sim/core/best_rotation.h"
-#include "server/sim/core/rigid_motion.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -152,37 +151,11 @@ static void fit(pal_recovery *r, const double *d)
         if (!r->of[p].fixed) pal_best_rotation(r->of[p].sum, r->of[p].rotation);
 }
 
-/* w = A^-1 sum k x x v, A = sum k (x.x I - x x') */
-static void find_spins(pal_recovery *r, const double *d, const double *v)
-{
-    for (int p = 0; p < r->n_region; p++) {
-        memset(r->of[p].sum, 0, sizeof r->of[p].sum);
-        pal_set3(r->of[p].spin_1_s, 0, 0, 0);
-    }
-    for (int n = 0; n < r->n_active; n++) {
-        const int i = r->active[n];
-        pal_recovery_region *region = &r->of[r->edge_region[i]];
-        double x[3], rate[3], moment[3];
-        edge_vector(d, ends(r, i), x), edge_vector(v, ends(r, i), rate);
-        pal_add_outer(region->sum, -r->k_N_m[i], x, x);
-        for (int a = 0; a < 3; a++) region->sum[4 * a] += r->k_N_m[i] * pal_dot3(x, x);
-        pal_cross3(moment, x, rate);
-        pal_axpy3(region->spin_1_s, r->k_N_m[i], moment);
-    }
-    for (int p = 0; p < r->n_region; p++) {
-        double moment[3];
-        pal_copy3(moment, r->of[p].spin_1_s);
-        pal_rigid_spin(r->of[p].sum, moment, 0, r->of[p].spin_1_s);
-    }
-}
-
-double pal_recovery_energy(pal_recovery *r, const double *d, const double *v, double *f)
+double pal_recovery_energy(pal_recovery *r, const double *d, double *f)
 {
     double sum = 0;
-    const bool damped = f && v && r->damp_s > 0;
     if (!pal_recovery_acts(r) || r->at_rest) return 0;
     fit(r, d);
-    if (damped) find_spins(r, d, v);
     for (int p = 0; p < r->n_region; p++) r->of[p].energy_J = r->of[p].size_J = 0;
     for (int n = 0; n < r->n_active; n++) {
         const int i = r->active[n];
@@ -195,13 +168,6 @@ double pal_recovery_energy(pal_recovery *r, const double *d, const double *v, do
         pal_sub3(u, x, u);
         region->energy_J += 0.5 * k * pal_dot3(u, u), region->size_J += r->k_N_m[i] * pal_dot3(y, y);
         if (!f) continue;
-        if (damped) {
-            double rate[3], turned[3];
-            edge_vector(v, end, rate);
-            pal_cross3(turned, region->spin_1_s, x);
-            pal_sub3(rate, rate, turned);
-            pal_axpy3(u, r->damp_s, rate);
-        }
         pal_axpy3(f + 3 * (size_t)end[0], k, u);
         pal_axpy3(f + 3 * (size_t)end[1], -k, u);
     }
@@ -227,7 +193,7 @@ void pal_recovery_add_forces(pal_recovery *r, pal_body *body)
 {
     if (n_acting(r) == 0) return;
     const uint64_t before = pal_clock_ns();
-    (void)pal_recovery_energy(r, body->d, body->dv, body->f);
+    (void)pal_recovery_energy(r, body->d, body->f);
     body->safeguards.ns += pal_clock_ns() - before;
 }
 
@@ -543,7 +509,7 @@ static void begin(pal_recovery *r, const pal_body *body, double before_J)
     show(r);
     fix(r, body, true);
     double new_J = 0, left_J = before_J - r->model.energy(r->model.self, body);
-    (void)pal_recovery_energy(r, body->d, NULL, NULL);
+    (void)pal_recovery_energy(r, body->d, NULL);
     for (int p = 0; p < r->n_region; p++)
         if (r->of[p].stays)
             left_J -= r->of[p].energy_J;

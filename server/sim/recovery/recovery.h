@@ -1,9 +1,9 @@
-/* Recovery from element inversion: one mechanism for hexahedra, tetrahedra, springs and control cells.
+/* Recovery from element inversion of hexahedra and tetrahedra (springs and control cells: inverted_regions.h).
  *
- * Elements, and lattices of springs, have states of balance that are not the body's shape at rest: folded, mirrored,
- * crumpled. Every element keeps its own force while it can: with the nearest proper rotation it is the gradient of an
- * energy that is finite for every F. Where inversion lasts, the elements concerned form a *region* and the edges of
- * these elements act instead, as vectors (Mueller et al. 2005, Sorkine and Alexa 2007 with one rotation for a region),
+ * Elements have states of balance that are not the body's shape at rest: folded, mirrored, crumpled. Every element
+ * keeps its own force while it can: with the nearest proper rotation it is the gradient of an energy that is finite for
+ * every F. Others form a *region*, where the edges of the elements act instead, as vectors (Mueller et al. 2005,
+ * Sorkine and Alexa 2007, with one rotation for a region),
  *
  *     E = sum of the elements in no region  +  sum over regions of s phi,
  *     phi = min_G 1/2 sum_ij k_ij |(x_i - x_j) - G (X_i - X_j)|^2.
@@ -12,17 +12,19 @@
  * with G fixed (envelope theorem), without net force or torque; its tangent s k_ij I is an upper bound. A region that
  * reaches the supports, or has more than half of the body's elements, takes their rotation as G.
  *
- * Clocks are simulated seconds (tuning.h). A region is formed when an element has had a ratio of volume below
- * PAL_INVERTED_LOW or above _HIGH for PAL_RECOVERY_WAIT_S, of such elements and their neighbours, but of none that a
- * load acts on. It grows by its neighbours every PAL_RECOVERY_GROW_S in which it stays bad. After PAL_RECOVERY_WHOLE_S
- * it is the whole connected body. It becomes elements again when all its ratios are within PAL_RECOVERED_LOW to _HIGH
- * and the tank can pay.
+ * Inverted is an element with a ratio of volume below PAL_INVERTED_LOW or above _HIGH. It enters a region at once when
+ * the ratio at its middle too is outside PAL_RECOVERED_LOW to _HIGH, since its energy has no derivative near a flat
+ * middle; else after PAL_RECOVERY_WAIT_S (simulated, as all clocks) without a load on the body. A region that stays bad
+ * without a load grows by its neighbours every PAL_RECOVERY_GROW_S, and after PAL_RECOVERY_WHOLE_S it is the whole
+ * connected body. It becomes elements again when all its ratios are within PAL_RECOVERED_LOW to _HIGH, it would store
+ * little (PAL_RECOVERY_LEAVE_STRAIN; not asked for any longer after PAL_RECOVERY_WHOLE_S) and the tank can pay.
  *
- * Energy book. A tank T >= 0, empty when the first region is formed, receives what the body dissipates while no load
- * acts, and pays for every change at fixed x: of s, of the elements in regions, of material or supports. A change that
- * T cannot pay is made smaller: s begins at most so large that the energy does not rise, and rises to 1 as T permits,
- * within PAL_RECOVERY_STIFFEN_S at the fastest. Without loads E + kinetic energy + T - debt never increases; debt is
- * what the floor of s has put in (PAL_RECOVERY_SOFT_MIN), and dissipation repays it before it fills T.
+ * Energy book. A tank T >= 0, empty when the first region is formed, receives what the body dissipates (its energy
+ * less the work of lasting loads; nothing while contact acts) and pays for every change at fixed x: of s, of the
+ * elements in regions, of material or supports. A change that T cannot pay is made smaller: s begins at most so large
+ * that the energy does not rise, and rises to 1 as T permits, within PAL_RECOVERY_STIFFEN_S at the fastest. Without
+ * loads E + kinetic energy + T - debt never increases; debt is what the floor of s has put in (PAL_RECOVERY_SOFT_MIN),
+ * and dissipation repays it before it fills T.
  *
  * State (regions, s, debt, clocks) goes over to another body of the same elements, as at a switch of supports
  * (pal_recovery_transfer). T begins anew there, and where loads change: nobody sees more energy than at the change.
@@ -57,7 +59,6 @@ enum { PAL_RECOVERY_EDGES_MAX = 24, PAL_RECOVERY_REGIONS_MAX = 64 };
 typedef struct pal_recovery_region {
     bool fixed;         /* G is the rotation of the supports                                     */
     double rotation[9]; /* G                                                                     */
-    double spin_1_s[3]; /* best-fit spin of the velocities, for damping                          */
     double sum[9];      /* sum_ij k (x_i - x_j)(X_i - X_j)', which G fits best                   */
     double scale;       /* s                                                                     */
     double energy_J;    /* s phi at the last evaluation                                          */
@@ -94,7 +95,6 @@ typedef struct pal_recovery {
     double *d_m, *load_N; /* of the nodes then                                        [n_node][3]    */
     bool touched;         /* some of these loads came from contact                                      */
     double seen_s;        /* world time of the last update                                              */
-    double damp_s;        /* tau of damping in regions; 0: none. Set by the model                       */
 } pal_recovery;
 
 /* Copies the model; rest [n_node][3] is borrowed. MEMORY. [load] */
@@ -115,12 +115,10 @@ static inline bool pal_recovery_acts(const pal_recovery *r)
     return r && r->n_region > 0;
 }
 
-/* the forces of the regions at the body's state, with damping; timed in body->safeguards */
+/* the forces of the regions at the body's state, timed in body->safeguards */
 void pal_recovery_add_forces(pal_recovery *r, pal_body *body);
-/* At nodes d: energy, J; f += forces (NULL: none), with those of damping
- * -damp_s s k (v_i - v_j - w x (x_i - x_j)) for velocities v (NULL: none). As w fits the velocities best, damping
- * changes neither momentum nor angular momentum */
-double pal_recovery_energy(pal_recovery *r, const double *d, const double *v, double *f);
+/* at nodes d: energy, J; f += forces; NULL: none */
+double pal_recovery_energy(pal_recovery *r, const double *d, double *f);
 /* Before energy, forces and linearise: while the body's d are its nodes at rest, for which solvers ask between steps,
  * all elements act and there are no regions */
 void pal_recovery_select(pal_recovery *r, const pal_body *body);

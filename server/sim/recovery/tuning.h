@@ -10,10 +10,11 @@
 #define PAL_RECOVERED_LOW  0.3
 #define PAL_RECOVERED_HIGH (1 / PAL_INVERTED_LOW)
 
-/* ---- clocks and scale of recovery.h, s. Inversion that lasts as long without a load forms a region: elements with
- * proper rotations turn most inversions back before (tests/sim/recovery/test_recovery.c). A region that stays bad takes
- * in its neighbours every GROW_S and is the whole connected body after WHOLE_S; s needs STIFFEN_S from 0 to 1, so that
- * nothing jumps. SOFT_MIN: least s, so that a folded body that stores next to nothing straightens in seconds ---- */
+/* ---- clocks, s, and scale of recovery.h (tests/sim/recovery/test_recovery.c). Inversion of corners that lasts WAIT_S
+ * without a load forms a region: elements with proper rotations turn most of it back before. A region that stays bad
+ * takes in its neighbours every GROW_S and is the whole connected body after WHOLE_S; s needs STIFFEN_S from 0 to 1, so
+ * that nothing jumps. SOFT_MIN: least s, so that a folded body that stores next to nothing straightens in seconds ----
+ */
 #define PAL_RECOVERY_WAIT_S    0.15
 #define PAL_RECOVERY_GROW_S    0.5
 #define PAL_RECOVERY_WHOLE_S   2.0

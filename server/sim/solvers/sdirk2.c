@@ -50,7 +50,7 @@ static pal_err run(void *self, pal_step *step)
         memcpy(body->x, core->x0, n_byte);
         memcpy(core->xs, core->x0, n_byte);
         memcpy(core->vs, core->v0, n_byte);
-        two_stages = core->energy_rise_s <= 0;
+        two_stages = core->rose_s <= 0;
         if (!two_stages) { /* backward Euler over the whole step, see above */
             PAL_TRY(pal_implicit_stage(core, step, step->dt_s));
         } else {

@@ -50,14 +50,14 @@ static void the_force_of_regions_is_minus_the_gradient(void)
             pal_recovery *r = b.row->recovery;
             REQUIRE(r->n_region > 0);
             double *f = hex_zeros(n), *p = hex_zeros(n), *kp = hex_zeros(n), *kq = hex_zeros(n), *q = hex_zeros(n);
-            (void)pal_recovery_energy(r, b.body.d, NULL, f);
+            (void)pal_recovery_energy(r, b.body.d, f);
             const double size = hex_largest(f, n), e = 1e-6 * 0.01;
             for (int i = 0; i < n; i++) {
                 const double keep = b.body.x[i];
                 b.body.x[i] = keep + e;
-                const double up = pal_recovery_energy(r, b.body.d, NULL, NULL);
+                const double up = pal_recovery_energy(r, b.body.d, NULL);
                 b.body.x[i] = keep - e;
-                const double down = pal_recovery_energy(r, b.body.d, NULL, NULL);
+                const double down = pal_recovery_energy(r, b.body.d, NULL);
                 b.body.x[i] = keep;
                 CHECK_NEAR(-(up - down) / (2 * e), f[i], 1e-5 * size);
             }
@@ -81,7 +81,7 @@ static void the_force_of_regions_is_minus_the_gradient(void)
             for (int k = 0; k < r->n_region; k++) all_fixed &= r->of[k].fixed;
             memset(q, 0, sizeof *q * (size_t)n);
             for (int i = 0; i < n; i++) b.body.x[i] += e * p[i];
-            (void)pal_recovery_energy(r, b.body.d, NULL, q);
+            (void)pal_recovery_energy(r, b.body.d, q);
             for (int i = 0; i < n && all_fixed; i++) CHECK_NEAR((f[i] - q[i]) / e, kp[i], 1e-6 * hex_largest(kp, n));
             free(f), free(p), free(kp), free(kq), free(q);
             hex_body_free(&b);
