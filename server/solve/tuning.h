@@ -1,4 +1,4 @@
-/* Tuning constants of solve: limits of what preflight calls weak, and which cut voxels are kept. */
+/* Tuning constants of solve: limits of what preflight calls weak. */
 #ifndef PAL_SOLVE_TUNING_H
 #define PAL_SOLVE_TUNING_H
 
@@ -11,9 +11,4 @@
 /* Poisson's ratio above which full integration locks; with less it is within some percent (tests/stability, case
  * poisson_static) */
 #define PAL_LOCKING_POISSON 0.47
-/* fill below which cut voxels are dropped, and the volume that may be lost by it; fill otherwise (load_case.c gives
- * the measurements; tests/solve/test_solve.c) */
-#define PAL_DROP_FILL   0.25
-#define PAL_MAX_MISSING 0.025
-#define PAL_KEEP_FILL   0.02
 #endif
