@@ -103,7 +103,7 @@ static double reach(const pal_body *body, const pal_brush *b, int i, double *t)
 }
 
 /* allocates the arrays of a slot for the items in reach; the weights of a handle sum to 1 */
-static pal_err fill(const pal_body *body, const pal_brush *b, slot *s, pal_diagnostic *diag)
+static pal_err take_items(const pal_body *body, const pal_brush *b, slot *s, pal_diagnostic *diag)
 {
     const bool curve = b->kind == PAL_BRUSH_CURVE;
     const int n = curve ? body->display.n_shown : body->display.surface->n_tri;
@@ -131,6 +131,15 @@ static pal_err fill(const pal_body *body, const pal_brush *b, slot *s, pal_diagn
         return PAL_REFUSE(diag, "brush: stiffness_N_m %g, body \"%s\" takes up to %.3g over %d nodes", b->stiffness_N_m,
                           body->name, limit, s->n);
     return PAL_ERR_OK;
+}
+
+/* the same with an arena of the slot's own, which it keeps on success only */
+static pal_err fill(const pal_body *body, const pal_brush *b, slot *s, pal_diagnostic *diag)
+{
+    s->arena = pal_arena_create(4096, true);
+    pal_err err = s->arena ? take_items(body, b, s, diag) : PAL_ERR_MEMORY;
+    if (err) pal_arena_destroy(s->arena);
+    return err;
 }
 
 /* ---- set and end ---- */
@@ -184,9 +193,7 @@ pal_err pal_brush_set(void *self, const pal_body *body, int slot_index, const pa
         s->left_s = PAL_BLEND_S;
         return PAL_ERR_OK;
     }
-    fresh.arena = pal_arena_create(4096, true);
-    pal_err err = fresh.arena ? fill(body, b, &fresh, diag) : PAL_ERR_MEMORY;
-    if (err) pal_arena_destroy(fresh.arena);
+    pal_err err = fill(body, b, &fresh, diag);
     if (err == PAL_ERR_MEMORY) return pal_diagnostic_set(diag, err, "no memory for a brush on body \"%s\"", body->name);
     PAL_TRY(err);
     goal(b, fresh.now);
@@ -218,11 +225,7 @@ void pal_brush_hand(void *self, const pal_body *body, const void *before, const 
         const slot *was = &((const brushes *)before)->slot[i];
         slot *s = &((brushes *)self)->slot[i], fresh = {.brush = was->brush};
         double back[3];
-        if (!acts(was) || !(fresh.arena = pal_arena_create(4096, true))) continue;
-        if (fill(body, &was->brush, &fresh, NULL)) {
-            pal_arena_destroy(fresh.arena);
-            continue;
-        }
+        if (!acts(was) || fill(body, &was->brush, &fresh, NULL)) continue;
         for (int k = 0; k < fresh.n && was->brush.kind == PAL_BRUSH_CURVE; k++) {
             const size_t node = 3 * (size_t)fresh.item[k];
             displacement_back(was, from, body->node_rest + node, back);

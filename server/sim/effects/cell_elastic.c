@@ -144,14 +144,10 @@ static void measure(void *self, const pal_body *body, pal_field field, double *s
 
 static const pal_tangent tangent = {.couple = couple, .linearise = linearise, .multiply = multiply, .rotate = rotate};
 
-const pal_effect pal_effect_cell_elastic = {.name = "cell_elastic",
-                                            .stage = PAL_STAGE_FORCE,
+const pal_effect pal_effect_cell_elastic = {PAL_EFFECT("cell_elastic", FORCE),
                                             .internal = true,
-                                            .make = make,
-                                            .run = run,
                                             .energy = energy,
                                             .reset = reset,
                                             .recovery.recover = recover,
                                             .tangent = &tangent,
-                                            .inspect.measure = measure,
-                                            .inspect.fields = PAL_ELASTIC_FIELDS};
+                                            .inspect = {.measure = measure, .fields = PAL_ELASTIC_FIELDS}};

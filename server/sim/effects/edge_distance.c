@@ -169,18 +169,12 @@ static void measure(void *self, const pal_body *body, pal_field field, double *s
     }
 }
 
-const pal_effect pal_effect_edge_distance = {.name = "edge_distance",
-                                             .stage = PAL_STAGE_FORCE,
+const pal_effect pal_effect_edge_distance = {PAL_EFFECT("edge_distance", FORCE),
                                              .internal = true,
-                                             .make = make,
-                                             .run = run,
                                              .energy = energy,
                                              .sleep.settled_s = settled_s,
-                                             .bounds.stiffness = stiffness,
-                                             .bounds.damping = damping,
-                                             .recovery.springs = springs,
-                                             .recovery.recover = pal_spring_recover,
+                                             .bounds = {.stiffness = stiffness, .damping = damping},
+                                             .recovery = {.springs = springs, .recover = pal_spring_recover},
                                              .reset = reset,
                                              .material = edit,
-                                             .inspect.measure = measure,
-                                             .inspect.fields = 1u << PAL_FIELD_STIFFNESS_J};
+                                             .inspect = {.measure = measure, .fields = 1u << PAL_FIELD_STIFFNESS_J}};

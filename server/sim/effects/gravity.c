@@ -51,5 +51,4 @@ static double energy(void *self, const pal_body *body)
     return -sum;
 }
 
-const pal_effect pal_effect_gravity = {
-    .name = "gravity", .stage = PAL_STAGE_FORCE, .make = make, .run = run, .energy = energy};
+const pal_effect pal_effect_gravity = {PAL_EFFECT("gravity", FORCE), .energy = energy};

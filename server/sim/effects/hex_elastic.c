@@ -159,16 +159,12 @@ static void stress(void *self, const pal_body *body, pal_stress_take *take, void
 static const pal_tangent tangent = {
     .couple = couple, .linearise = linearise, .multiply = multiply, .assemble = assemble, .rotate = rotate};
 
-const pal_effect pal_effect_hex_elastic = {.name = "hex_elastic",
-                                           .stage = PAL_STAGE_FORCE,
-                                           .internal = true,
-                                           .make = make,
-                                           .run = run,
-                                           .energy = energy,
-                                           .bounds.stiffness = stiffness,
-                                           .material = material,
-                                           .reset = reset,
-                                           .tangent = &tangent,
-                                           .inspect.measure = measure,
-                                           .inspect.fields = PAL_ELASTIC_FIELDS,
-                                           .inspect.stress = stress};
+const pal_effect pal_effect_hex_elastic = {
+    PAL_EFFECT("hex_elastic", FORCE),
+    .internal = true,
+    .energy = energy,
+    .bounds.stiffness = stiffness,
+    .material = material,
+    .reset = reset,
+    .tangent = &tangent,
+    .inspect = {.measure = measure, .fields = PAL_ELASTIC_FIELDS, .stress = stress}};

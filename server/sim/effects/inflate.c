@@ -49,19 +49,6 @@ static pal_err read_keys(inflate *row, pal_config_entry *item, pal_diagnostic *d
     return pal_entry_check_unused(item, diag);
 }
 
-/* from the first corner, so that a distant origin costs no accuracy */
-static double volume(const double *x, const int32_t *tri, int n_tri)
-{
-    double sum = 0;
-    for (int t = 0; t < n_tri; t++) {
-        double e[3][3], n[3];
-        for (int c = 0; c < 3; c++) pal_sub3(e[c], x + 3 * (size_t)tri[3 * t + c], x + 3 * (size_t)tri[0]);
-        pal_cross3(n, e[1], e[2]);
-        sum += pal_dot3(e[0], n);
-    }
-    return sum / 6;
-}
-
 static pal_err check_surface(inflate *row, const pal_config_entry *item, const pal_build *build)
 {
     const pal_adaptive_surface *adaptive = build->body->model.adaptive;
@@ -73,8 +60,9 @@ static pal_err check_surface(inflate *row, const pal_config_entry *item, const p
     if (n_open > 0)
         return PAL_REFUSE(build->diag, "%s: \"%s\" needs a closed surface, this one has %d open edges", item->path,
                           item->name, n_open);
-    row->fine_m3 =
-        volume(levels->x, levels->face + 3 * (size_t)levels->first_face[last], pal_levels_n_face(levels, last));
+    row->fine_m3 = pal_surface_volume(&(pal_surface){.n_tri = pal_levels_n_face(levels, last),
+                                                     .x = levels->x,
+                                                     .tri = levels->face + 3 * (size_t)levels->first_face[last]});
     double size = build->body->length_scale_m,
            min_m3 = DBL_EPSILON * pal_levels_n_face(levels, last) * size * size * size;
     if (!(fabs(row->fine_m3) > min_m3))
@@ -102,7 +90,7 @@ static void update_rest_volume(inflate *row, const pal_adaptive_surface *adaptiv
 {
     if (row->revision == adaptive->revision) return;
     row->revision = adaptive->revision;
-    row->rest_m3 = volume(adaptive->levels.x, adaptive->tri, adaptive->n_tri);
+    row->rest_m3 = pal_surface_volume(&adaptive->surface);
     if (!(row->rest_m3 / row->fine_m3 > 0.01)) row->rest_m3 = row->fine_m3;
 }
 
@@ -214,11 +202,5 @@ static void reset(void *self, const pal_body *body)
     ((inflate *)self)->share = 0;
 }
 
-const pal_effect pal_effect_inflate = {.name = "inflate",
-                                       .stage = PAL_STAGE_FORCE,
-                                       .make = make,
-                                       .run = run,
-                                       .energy = energy,
-                                       .bounds.stiffness = stiffness,
-                                       .reset = reset,
-                                       .sleep.settled_s = settled_s};
+const pal_effect pal_effect_inflate = {PAL_EFFECT("inflate", FORCE), .energy = energy, .bounds.stiffness = stiffness,
+                                       .reset = reset, .sleep.settled_s = settled_s};

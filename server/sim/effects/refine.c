@@ -24,9 +24,9 @@
  * factors). A body unchanged since the last evaluation is evaluated again only after dwell_s; until that finds no
  * present or deferred change, the body does not sleep (component sleep). */
 #include "server/base/vec3.h"
-#include "server/num/polar.h"
 #include "server/sim/core/blend.h"
 #include "server/sim/core/effect_list.h"
+#include "server/sim/core/rigid_motion.h"
 #include "server/sim/effects/tuning.h"
 #include "server/sim/surface/refine_measure.h"
 
@@ -34,6 +34,12 @@
 #include <string.h>
 
 enum { NOTHING, SPLIT, JOIN };
+
+/* nodes of a region, in the order of `node` [n_vertex] */
+typedef struct gathered {
+    int32_t *node;
+    double *mass_kg, *x, *v_m_s;
+} gathered;
 
 typedef struct refine {
     pal_adaptive_surface *adaptive;
@@ -61,7 +67,8 @@ typedef struct refine {
     double *mass_was;             /* values before the switch, valid where `seen` is its number [n_vertex] */
     uint64_t *seen;               /* [n_vertex]                                                     */
     double *zero_m_s, *bound_N_m; /* velocities [n_vertex][3]; stiffness of the components [n_vertex] */
-    double inner_J;               /* kinetic energy without the rigid motion, before the switch */
+    gathered gathered;
+    double inner_J; /* kinetic energy without the rigid motion, before the switch */
     pal_refine_history report;
 } refine;
 
@@ -132,9 +139,10 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     row->backoff = PAL_NEW(build->arena, uint8_t, levels->first_face[levels->n_level]);
     row->action = PAL_NEW(build->arena, uint8_t, adaptive->n_slot);
     row->seen = PAL_NEW(build->arena, uint64_t, n_vertex);
-    row->zero_m_s = PAL_NEW(build->arena, double, 3 * n_vertex);
-    if (!PAL_NEW_DOUBLES(build->arena, n_vertex, &row->mass_was, &row->bound_N_m) || !row->switched_s ||
-        !row->backoff || !row->action || !row->seen || !row->zero_m_s)
+    row->gathered.node = PAL_NEW(build->arena, int32_t, n_vertex);
+    if (!PAL_NEW_DOUBLES(build->arena, n_vertex, &row->mass_was, &row->bound_N_m, &row->gathered.mass_kg) ||
+        !PAL_NEW_DOUBLES(build->arena, 3 * n_vertex, &row->zero_m_s, &row->gathered.x, &row->gathered.v_m_s) ||
+        !row->switched_s || !row->backoff || !row->action || !row->seen || !row->gathered.node)
         return PAL_ERR_MEMORY;
     clear(row);
     *self = row;
@@ -270,15 +278,6 @@ static bool execute_requests(refine *row, pal_body *body)
     return n_split + n_join > 0;
 }
 
-/* of all FORCE components */
-static double elastic_J(const pal_step *step)
-{
-    double sum = 0;
-    for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->energy) sum += step->force[i].effect->energy(step->force[i].self, step->body);
-    return sum;
-}
-
 /* one Jacobi iteration for the new nodes alone, towards the balance of the components' forces at rest; changes f */
 static bool relax_once(refine *row, pal_step *step)
 {
@@ -309,7 +308,8 @@ static void relax(refine *row, pal_step *step)
     for (int i = 0; i < step->n_force; i++)
         if (step->force[i].effect->bounds.stiffness)
             step->force[i].effect->bounds.stiffness(step->force[i].self, body, row->bound_N_m);
-    for (int round = 0; round < MAX_RELAX && elastic_J(step) - was > min; round++)
+    for (int round = 0; round < MAX_RELAX && pal_components_energy_J(step->force, step->n_force, body) - was > min;
+         round++)
         if (!relax_once(row, step)) return;
 }
 
@@ -335,64 +335,40 @@ static double keep_elastic(const refine *row, double was_J, double now_J, double
     return now_J * *ramp / was;
 }
 
-/* rigid part of the motion of the region's free nodes: V + Omega x (x - centre) */
+/* momenta about its centre, and energies, of the gathered nodes */
 typedef struct region {
-    double mass, centre[3], V[3], angular[3], inertia_axis[9], inertia[3], inner_J;
+    int n;
+    pal_rigid_motion motion;
+    double momentum[3], moment[3], rigid_J, inner_J;
 } region;
 
-/* I^-1 L; no rotation about an axis whose inertia is rounding */
-static void spin_of(const region *r, const double angular[3], double Omega[3])
+static double rigid_J(const pal_rigid_motion *motion, const double momentum[3], const double moment[3])
 {
-    pal_set3(Omega, 0, 0, 0);
-    for (int k = 0; k < 3; k++)
-        if (r->inertia[k] > PAL_ROUNDING * r->inertia[2])
-            pal_axpy3(Omega, pal_dot3(r->inertia_axis + 3 * k, angular) / r->inertia[k], r->inertia_axis + 3 * k);
+    return 0.5 * (pal_dot3(momentum, motion->linear) + pal_dot3(moment, motion->angular));
 }
 
-/* velocity relative to the rigid motion, and position relative to the centre */
-static void beside(const region *r, const double Omega[3], const pal_body *body, int i, double arm[3], double d[3])
+/* gathers the region's nodes, with velocities relative to their rigid motion; false: there are none */
+static bool find_region(const refine *row, const pal_body *body, bool whole, region *r)
 {
-    double rigid[3];
-    pal_sub3(arm, body->x + 3 * (size_t)i, r->centre);
-    pal_cross3(rigid, Omega, arm);
-    for (int c = 0; c < 3; c++) d[c] = body->v[3 * (size_t)i + (size_t)c] - r->V[c] - rigid[c];
-}
-
-static bool find_region(const refine *row, const pal_body *body, bool whole, region *r, double Omega[3])
-{
-    static const double none[3];
-    double s[6] = {0}, arm[3], d[3], cross[3];
-    *r = (region){.mass = 0};
+    const gathered *g = &row->gathered;
+    *r = (region){.n = 0};
     for (int k = 0; k < body->n_active; k++) {
         const int i = pal_body_point(body, k);
         if (!in_region(row, body, whole, i)) continue;
-        r->mass += body->mass_kg[i];
-        pal_axpy3(r->centre, body->mass_kg[i], body->x + 3 * (size_t)i);
-        pal_axpy3(r->V, body->mass_kg[i], body->v + 3 * (size_t)i);
+        g->node[r->n] = i;
+        g->mass_kg[r->n] = body->mass_kg[i];
+        pal_copy3(g->x + 3 * (size_t)r->n, body->x + 3 * (size_t)i);
+        pal_copy3(g->v_m_s + 3 * (size_t)r->n++, body->v + 3 * (size_t)i);
     }
-    if (!(r->mass > 0)) return false;
-    pal_scale3(r->centre, 1 / r->mass, r->centre);
-    pal_scale3(r->V, 1 / r->mass, r->V);
-    for (int k = 0; k < body->n_active; k++) {
-        const int i = pal_body_point(body, k);
-        if (!in_region(row, body, whole, i)) continue;
-        const double m = body->mass_kg[i];
-        beside(r, none, body, i, arm, d);
-        pal_cross3(cross, arm, d);
-        pal_axpy3(r->angular, m, cross);
-        s[0] += m * arm[0] * arm[0], s[1] += m * arm[1] * arm[1], s[2] += m * arm[2] * arm[2];
-        s[3] += m * arm[0] * arm[1], s[4] += m * arm[0] * arm[2], s[5] += m * arm[1] * arm[2];
+    pal_rigid_motion_of(r->n, g->mass_kg, g->x, g->v_m_s, r->momentum, r->moment, &r->motion);
+    r->rigid_J = rigid_J(&r->motion, r->momentum, r->moment);
+    for (int k = 0; k < r->n; k++) {
+        double rigid[3], *v = g->v_m_s + 3 * (size_t)k;
+        pal_rigid_motion_at(&r->motion, g->x + 3 * (size_t)k, rigid);
+        pal_sub3(v, v, rigid);
+        r->inner_J += 0.5 * g->mass_kg[k] * pal_dot3(v, v);
     }
-    const double inertia[9] = {s[1] + s[2], -s[3], -s[4], -s[3], s[0] + s[2], -s[5], -s[4], -s[5], s[0] + s[1]};
-    pal_eigen3(inertia, r->inertia, r->inertia_axis);
-    spin_of(r, r->angular, Omega);
-    for (int k = 0; k < body->n_active; k++) {
-        const int i = pal_body_point(body, k);
-        if (!in_region(row, body, whole, i)) continue;
-        beside(r, Omega, body, i, arm, d);
-        r->inner_J += 0.5 * body->mass_kg[i] * pal_dot3(d, d);
-    }
-    return true;
+    return r->n > 0;
 }
 
 /* Restores both momenta of the free nodes, and the kinetic energy less `gained`, J, by the velocities of the changed
@@ -400,31 +376,29 @@ static bool find_region(const refine *row, const pal_body *body, bool whole, reg
 static bool keep_motion(const refine *row, pal_body *body, double gained_J, bool whole)
 {
     const pal_refine_balance *before = &row->report.before, *raw = &row->report.raw;
+    const gathered *g = &row->gathered;
     region r;
-    double Omega[3], V[3], angular[3], spin[3], push[3], moment[3], arm[3], d[3], rigid[3];
-    if (!find_region(row, body, whole, &r, Omega)) return whole;
-    pal_sub3(push, before->momentum_kg_m_s, raw->momentum_kg_m_s);
-    pal_sub3(angular, before->angular_momentum_kg_m2_s, raw->angular_momentum_kg_m2_s);
-    pal_cross3(moment, r.centre, push);
-    pal_sub3(angular, angular, moment);
-    pal_add3(angular, angular, r.angular);
-    spin_of(&r, angular, spin);
-    pal_copy3(V, r.V);
-    pal_axpy3(V, 1 / r.mass, push);
-    double rigid_J = 0.5 * (r.mass * pal_dot3(r.V, r.V) + pal_dot3(Omega, r.angular));
-    double wanted_J = before->kinetic_J - gained_J - (raw->kinetic_J - rigid_J - r.inner_J) -
-                      0.5 * (r.mass * pal_dot3(V, V) + pal_dot3(spin, angular));
+    pal_rigid_motion to;
+    double momentum[3], moment[3], turn[3];
+    if (!find_region(row, body, whole, &r)) return whole;
+    pal_sub3(momentum, before->momentum_kg_m_s, raw->momentum_kg_m_s);
+    pal_sub3(moment, before->angular_momentum_kg_m2_s, raw->angular_momentum_kg_m2_s);
+    pal_cross3(turn, r.motion.centre_m, momentum);
+    pal_sub3(moment, moment, turn);
+    pal_add3(moment, moment, r.moment);
+    pal_add3(momentum, momentum, r.momentum);
+    pal_rigid_motion_find(r.n, g->mass_kg, g->x, momentum, moment, &to);
+    double wanted_J =
+        before->kinetic_J - gained_J - (raw->kinetic_J - r.rigid_J - r.inner_J) - rigid_J(&to, momentum, moment);
     /* nothing to scale where the region moves rigidly */
     double scale = r.inner_J > 1e-12 * raw->kinetic_J ? sqrt(fmax(wanted_J, 0) / r.inner_J) : 1;
-    bool enough = scale >= 1 / PAL_CHANGE_MAX && scale <= PAL_CHANGE_MAX && r.inertia[0] > PAL_ROUNDING * r.inertia[2];
+    bool enough = scale >= 1 / PAL_CHANGE_MAX && scale <= PAL_CHANGE_MAX && to.n_axis == 3;
     if (!enough && !whole) return false;
     scale = fmin(fmax(scale, 1 / PAL_CHANGE_MAX), PAL_CHANGE_MAX);
-    for (int k = 0; k < body->n_active; k++) {
-        const int i = pal_body_point(body, k);
-        if (!in_region(row, body, whole, i)) continue;
-        beside(&r, Omega, body, i, arm, d);
-        pal_cross3(rigid, spin, arm);
-        for (int c = 0; c < 3; c++) body->v[3 * (size_t)i + (size_t)c] = V[c] + rigid[c] + scale * d[c];
+    for (int k = 0; k < r.n; k++) {
+        double *v = body->v + 3 * (size_t)g->node[k];
+        pal_rigid_motion_at(&to, g->x + 3 * (size_t)k, v);
+        pal_axpy3(v, scale, g->v_m_s + 3 * (size_t)k);
     }
     return true;
 }
@@ -439,8 +413,8 @@ static void change(refine *row, pal_step *step)
     /* the guard handles a non-finite state */
     if (!isfinite(pal_refine_balance_total_J(&before))) return;
     region whole;
-    double Omega[3];
-    row->inner_J = find_region(row, body, true, &whole, Omega) ? whole.inner_J : 0;
+    (void)find_region(row, body, true, &whole);
+    row->inner_J = whole.inner_J;
     report->n_switch++;
     for (int k = 0; k < body->n_active; k++) {
         const int i = pal_body_point(body, k);
@@ -548,11 +522,5 @@ const pal_refine_history *pal_refine_report(const void *self)
     return &((const refine *)self)->report;
 }
 
-const pal_effect pal_effect_refine = {.name = "refine",
-                                      .stage = PAL_STAGE_ADAPT,
-                                      .make = make,
-                                      .run = run,
-                                      .material = material,
-                                      .reset = reset,
-                                      .transfer = transfer,
-                                      .sleep.settled_s = settled_s};
+const pal_effect pal_effect_refine = {PAL_EFFECT("refine", ADAPT), .material = material, .reset = reset,
+                                      .transfer = transfer, .sleep.settled_s = settled_s};

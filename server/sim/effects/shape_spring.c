@@ -180,13 +180,9 @@ static void reset(void *self, const pal_body *body)
     ((shape_spring *)self)->frame = (pal_rigid_fit){.quat = {1}};
 }
 
-const pal_effect pal_effect_shape_spring = {.name = "shape_spring",
-                                            .stage = PAL_STAGE_FORCE,
-                                            .make = make,
-                                            .run = run,
+const pal_effect pal_effect_shape_spring = {PAL_EFFECT("shape_spring", FORCE),
                                             .compute_forces = compute_forces,
                                             .energy = energy,
-                                            .bounds.stiffness = stiffness,
-                                            .bounds.damping = damping,
+                                            .bounds = {.stiffness = stiffness, .damping = damping},
                                             .material = material,
                                             .reset = reset};

@@ -218,16 +218,12 @@ static void rotate(void *self, double *rotation)
 static const pal_tangent tangent = {
     .couple = couple, .linearise = linearise, .multiply = multiply, .assemble = assemble, .rotate = rotate};
 
-const pal_effect pal_effect_tet_elastic = {.name = "tet_elastic",
-                                           .stage = PAL_STAGE_FORCE,
-                                           .internal = true,
-                                           .make = make,
-                                           .run = run,
-                                           .energy = energy,
-                                           .bounds.stiffness = stiffness,
-                                           .material = material,
-                                           .reset = reset,
-                                           .tangent = &tangent,
-                                           .inspect.measure = measure,
-                                           .inspect.fields = PAL_ELASTIC_FIELDS,
-                                           .inspect.stress = stress};
+const pal_effect pal_effect_tet_elastic = {
+    PAL_EFFECT("tet_elastic", FORCE),
+    .internal = true,
+    .energy = energy,
+    .bounds.stiffness = stiffness,
+    .material = material,
+    .reset = reset,
+    .tangent = &tangent,
+    .inspect = {.measure = measure, .fields = PAL_ELASTIC_FIELDS, .stress = stress}};

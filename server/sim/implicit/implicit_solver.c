@@ -3,6 +3,7 @@
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
+#include "server/sim/core/rigid_motion.h"
 #include "server/sim/core/step_guard.h"
 #include "server/sim/core/sums.h"
 #include "server/sim/implicit/tuning.h"
@@ -250,15 +251,12 @@ static void keep_momentum(pal_implicit *core)
 static void free_mean(const pal_implicit *core, const double *a, const double *b, double mean[3])
 {
     const pal_body *body = core->system.body;
-    double mass = 0;
+    double less[3] = {0};
     pal_set3(mean, 0, 0, 0);
     if (core->system.n_free < body->n_dof) return;
-    for (int i = 0; i < body->n_dof; i++) {
-        pal_axpy3(mean, body->mass_kg[i], a + 3 * i);
-        if (b) pal_axpy3(mean, -body->mass_kg[i], b + 3 * i);
-        mass += body->mass_kg[i];
-    }
-    if (mass > 0) pal_scale3(mean, 1 / mass, mean);
+    pal_rigid_centre(body->n_dof, body->mass_kg, a, mean);
+    if (b) pal_rigid_centre(body->n_dof, body->mass_kg, b, less);
+    pal_sub3(mean, mean, less);
 }
 
 /* The longest of n moves without the mean motion, m/s; *n_long: how many are longer than max */
