@@ -19,7 +19,7 @@
 
 #include <math.h>
 
-typedef struct tet_row {
+typedef struct tet_elastic {
     pal_elastic_tets whole;         /* first member: tests read it */
     pal_elastic_tets *split;        /* NULL: no inversion recovery by the split */
     double *rest_m3;                /* volume of each piece at rest [n_piece] */
@@ -27,14 +27,14 @@ typedef struct tet_row {
     bool has_inversion, cheap;      /* cheap: whole.n_inverted shows that the body is inverted */
     uint64_t n_inversion, n_switch; /* since run, which has the body */
     pal_force_cache force_cache;    /* under an implicit solver: of `whole` while nothing is inverted */
-} tet_row;
+} tet_elastic;
 
 /* the split: eight tetrahedra of four nodes in one of ten */
-static pal_err cut(const tet_row *row, pal_arena *arena, pal_elastic_tets_options *to)
+static pal_err cut(const tet_elastic *tets, pal_arena *arena, pal_elastic_tets_options *to)
 {
     static const int piece[8][4] = {{0, 4, 6, 7}, {4, 1, 5, 8}, {6, 5, 2, 9}, {7, 8, 9, 3},
                                     {6, 8, 4, 5}, {6, 8, 5, 9}, {6, 8, 9, 7}, {6, 8, 7, 4}};
-    const pal_elastic_tets_options *from = &row->whole.options;
+    const pal_elastic_tets_options *from = &tets->whole.options;
     *to = *from;
     to->law = PAL_LAW_COROTATIONAL, to->recover = true, to->max_poisson = PAL_LOCK_FREE_POISSON;
     if (from->n_corner == 4) return PAL_ERR_OK;
@@ -50,34 +50,34 @@ static pal_err cut(const tet_row *row, pal_arena *arena, pal_elastic_tets_option
     return PAL_ERR_OK;
 }
 
-static pal_err make_split(tet_row *row, pal_build *build)
+static pal_err make_split(tet_elastic *tets, pal_build *build)
 {
-    const pal_elastic_tets_options *whole = &row->whole.options;
+    const pal_elastic_tets_options *whole = &tets->whole.options;
     const double h = build->body->edge_m;
     pal_elastic_tets_options options;
-    PAL_TRY(cut(row, build->arena, &options));
-    row->split = PAL_NEW(build->arena, pal_elastic_tets, 1);
-    if (!row->split) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_elastic_tets_make(&options, build, row->split));
-    row->cheap = whole->n_corner == 4 && whole->law == PAL_LAW_COROTATIONAL;
+    PAL_TRY(cut(tets, build->arena, &options));
+    tets->split = PAL_NEW(build->arena, pal_elastic_tets, 1);
+    if (!tets->split) return PAL_ERR_MEMORY;
+    PAL_TRY(pal_elastic_tets_make(&options, build, tets->split));
+    tets->cheap = whole->n_corner == 4 && whole->law == PAL_LAW_COROTATIONAL;
     /* skip slivers: they invert at any contact and say nothing about the body */
-    row->min_volume_m3 = 1e-3 / 6 * h * h * h;
-    row->rest_m3 = PAL_NEW(build->arena, double, options.n_tet);
-    if (!row->rest_m3) return PAL_ERR_MEMORY;
-    for (int i = 0; i < options.n_tet; i++) row->rest_m3[i] = pal_tet_volume(build->body->x_rest, options.tet + 4 * i);
+    tets->min_volume_m3 = 1e-3 / 6 * h * h * h;
+    tets->rest_m3 = PAL_NEW(build->arena, double, options.n_tet);
+    if (!tets->rest_m3) return PAL_ERR_MEMORY;
+    for (int i = 0; i < options.n_tet; i++) tets->rest_m3[i] = pal_tet_volume(build->body->x_rest, options.tet + 4 * i);
     return PAL_ERR_OK;
 }
 
-static bool is_inverted(const tet_row *row, const double *x)
+static bool is_inverted(const tet_elastic *tets, const double *x)
 {
-    if (row->cheap && !row->has_inversion) return row->whole.n_inverted > 0;
-    const double low = row->has_inversion ? PAL_TET_RECOVERED_LOW : PAL_INVERTED_LOW,
-                 high = row->has_inversion ? PAL_TET_RECOVERED_HIGH : PAL_INVERTED_HIGH;
-    bool neo = row->whole.options.law == PAL_LAW_NEO_HOOKEAN;
-    const pal_elastic_tets_options *pieces = &row->split->options;
+    if (tets->cheap && !tets->has_inversion) return tets->whole.n_inverted > 0;
+    const double low = tets->has_inversion ? PAL_TET_RECOVERED_LOW : PAL_INVERTED_LOW,
+                 high = tets->has_inversion ? PAL_TET_RECOVERED_HIGH : PAL_INVERTED_HIGH;
+    bool neo = tets->whole.options.law == PAL_LAW_NEO_HOOKEAN;
+    const pal_elastic_tets_options *pieces = &tets->split->options;
     for (int i = 0; i < pieces->n_tet; i++) {
-        if (fabs(row->rest_m3[i]) < row->min_volume_m3) continue;
-        double det = pal_tet_volume(x, pieces->tet + 4 * i) / row->rest_m3[i];
+        if (fabs(tets->rest_m3[i]) < tets->min_volume_m3) continue;
+        double det = pal_tet_volume(x, pieces->tet + 4 * i) / tets->rest_m3[i];
         if (det < low || (neo && det > high)) return true;
     }
     return false;
@@ -103,43 +103,43 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     options.tet = own ? body->element : body->tets->tet;
     options.n_tet = own ? body->n_element : body->tets->n_tet;
     options.fill = own && fill ? body->fill : NULL;
-    tet_row *row = PAL_NEW(build->arena, tet_row, 1);
-    if (!row) return PAL_ERR_MEMORY;
-    *self = row;
-    PAL_TRY(pal_elastic_tets_make(&options, build, &row->whole));
-    if (body->implicit) PAL_TRY(pal_force_cache_make(body->n_node, build->arena, &row->force_cache));
-    return options.recover && body->implicit && options.law != PAL_LAW_LINEAR ? make_split(row, build) : PAL_ERR_OK;
+    tet_elastic *tets = PAL_NEW(build->arena, tet_elastic, 1);
+    if (!tets) return PAL_ERR_MEMORY;
+    *self = tets;
+    PAL_TRY(pal_elastic_tets_make(&options, build, &tets->whole));
+    if (body->implicit) PAL_TRY(pal_force_cache_make(body->n_node, build->arena, &tets->force_cache));
+    return options.recover && body->implicit && options.law != PAL_LAW_LINEAR ? make_split(tets, build) : PAL_ERR_OK;
 }
 
 /* elements that forces come from now */
 static pal_elastic_tets *acting(void *self)
 {
-    tet_row *row = self;
-    return row->has_inversion ? row->split : &row->whole;
+    tet_elastic *tets = self;
+    return tets->has_inversion ? tets->split : &tets->whole;
 }
 
 static pal_err run(void *self, pal_step *step)
 {
-    tet_row *row = self;
-    step->body->safeguards.n_inversion += row->n_inversion, step->body->safeguards.n_split += row->n_switch;
-    row->n_inversion = row->n_switch = 0;
-    const uint64_t before = row->has_inversion ? pal_clock_ns() : 0;
-    if (!row->has_inversion && pal_force_cache_matches(&row->force_cache, step->body->d))
-        pal_force_cache_add(&row->force_cache, step->body->f);
+    tet_elastic *tets = self;
+    step->body->safeguards.n_inversion += tets->n_inversion, step->body->safeguards.n_split += tets->n_switch;
+    tets->n_inversion = tets->n_switch = 0;
+    const uint64_t before = tets->has_inversion ? pal_clock_ns() : 0;
+    if (!tets->has_inversion && pal_force_cache_matches(&tets->force_cache, step->body->d))
+        pal_force_cache_add(&tets->force_cache, step->body->f);
     else
         pal_elastic_tets_force(acting(self), step->body->d, step->body->f);
-    if (row->has_inversion) step->body->safeguards.ns += pal_clock_ns() - before;
+    if (tets->has_inversion) step->body->safeguards.ns += pal_clock_ns() - before;
     return PAL_ERR_OK;
 }
 
 static double energy(void *self, const pal_body *body)
 {
-    tet_row *row = self;
-    if (row->has_inversion) return pal_elastic_tets_energy(row->split, body->d, NULL);
-    if (pal_force_cache_matches(&row->force_cache, body->d)) return row->force_cache.energy_J;
-    double sum = pal_elastic_tets_energy(&row->whole, body->d, pal_force_cache_begin(&row->force_cache, body->d));
+    tet_elastic *tets = self;
+    if (tets->has_inversion) return pal_elastic_tets_energy(tets->split, body->d, NULL);
+    if (pal_force_cache_matches(&tets->force_cache, body->d)) return tets->force_cache.energy_J;
+    double sum = pal_elastic_tets_energy(&tets->whole, body->d, pal_force_cache_begin(&tets->force_cache, body->d));
     /* the fallback of inverted elements may differ at the next evaluation */
-    return row->whole.n_inverted > 0 ? sum : pal_force_cache_commit(&row->force_cache, sum);
+    return tets->whole.n_inverted > 0 ? sum : pal_force_cache_commit(&tets->force_cache, sum);
 }
 
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
@@ -149,23 +149,23 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
 {
-    tet_row *row = self;
+    tet_elastic *tets = self;
     (void)body, (void)diag;
-    pal_elastic_tets_material(&row->whole, to);
-    if (row->split) pal_elastic_tets_material(row->split, to);
-    pal_force_cache_invalidate(&row->force_cache);
+    pal_elastic_tets_material(&tets->whole, to);
+    if (tets->split) pal_elastic_tets_material(tets->split, to);
+    pal_force_cache_invalidate(&tets->force_cache);
     return PAL_ERR_OK;
 }
 
 static void reset(void *self, const pal_body *body)
 {
-    tet_row *row = self;
+    tet_elastic *tets = self;
     (void)body;
-    pal_elastic_tets_reset(&row->whole);
-    if (row->split) pal_elastic_tets_reset(row->split), row->split->n_single_rotation = 0;
-    row->has_inversion = false;
-    pal_force_cache_invalidate(&row->force_cache);
-    row->n_inversion = row->n_switch = 0;
+    pal_elastic_tets_reset(&tets->whole);
+    if (tets->split) pal_elastic_tets_reset(tets->split), tets->split->n_single_rotation = 0;
+    tets->has_inversion = false;
+    pal_force_cache_invalidate(&tets->force_cache);
+    tets->n_inversion = tets->n_switch = 0;
 }
 
 static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
@@ -180,23 +180,23 @@ static void stress(void *self, const pal_body *body, pal_stress_take *take, void
 
 static bool couple(void *self, pal_cliques *out)
 {
-    const pal_elastic_tets_options *of = &((tet_row *)self)->whole.options;
+    const pal_elastic_tets_options *of = &((tet_elastic *)self)->whole.options;
     *out = (pal_cliques){.n_item = of->n_tet, .n_corner = of->n_corner, .node = of->tet};
     return true;
 }
 
 static void linearise(void *self, const pal_body *body)
 {
-    tet_row *row = self;
-    bool before = row->has_inversion, known = row->split && (before || !row->cheap);
-    bool reported = known && is_inverted(row, body->d);
-    if (!reported) pal_elastic_tets_linearise(&row->whole, body->d);
-    row->has_inversion = known ? reported : row->split && is_inverted(row, body->d);
-    row->n_inversion += row->has_inversion;
-    row->n_switch += row->has_inversion != before;
-    if (row->has_inversion && !before) pal_elastic_tets_reset(row->split);
-    if (row->split) row->n_switch += pal_elastic_tets_check_rest(row->split, body, row->has_inversion);
-    if (row->has_inversion) pal_elastic_tets_linearise(row->split, body->d);
+    tet_elastic *tets = self;
+    bool before = tets->has_inversion, known = tets->split && (before || !tets->cheap);
+    bool reported = known && is_inverted(tets, body->d);
+    if (!reported) pal_elastic_tets_linearise(&tets->whole, body->d);
+    tets->has_inversion = known ? reported : tets->split && is_inverted(tets, body->d);
+    tets->n_inversion += tets->has_inversion;
+    tets->n_switch += tets->has_inversion != before;
+    if (tets->has_inversion && !before) pal_elastic_tets_reset(tets->split);
+    if (tets->split) tets->n_switch += pal_elastic_tets_check_rest(tets->split, body, tets->has_inversion);
+    if (tets->has_inversion) pal_elastic_tets_linearise(tets->split, body->d);
 }
 
 static void multiply(void *self, const pal_body *body, double k, const double *p, double *out)
