@@ -1,6 +1,6 @@
 /* `palpate bench NAME`: finds the bench, runs it and reports its results. */
 #include "server/bench/bench.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,9 +1,9 @@
 /* Resolves names of load cases and references to cases with their truths. */
 #include "server/calibrate/calibrate_cases.h"
 
+#include "server/base/flags.h"
 #include "server/base/vec3.h"
 #include "server/calibrate/tuning.h"
-#include "server/cli/flag.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/problem_file.h"
 

@@ -9,7 +9,7 @@
 #include "server/base/team.h"
 #include "server/calibrate/calibrate_cases.h"
 #include "server/calibrate/journal.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "server/mesh/files/file_bytes.h"
 #include "server/num/anneal.h"
 #include "server/scene/scene_file.h"

@@ -3,7 +3,7 @@
 #include "server/base/clock.h"
 #include "server/base/heap.h"
 #include "server/calibrate/calibrate_run.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/commands/tuning.h"
 #include "server/num/median.h"

@@ -1,6 +1,6 @@
 /* `palpate cells`: control cells of a primitive, of a named solid or of a file, subdivided and written as cells or as
  * their boundary, with the figures of paper A, Table 1. */
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/mesh/cells/cell_elements.h"
 #include "server/mesh/cells/cell_file.h"

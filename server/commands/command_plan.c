@@ -2,7 +2,7 @@
  * machine; the effects that are absent and what would call for them. The time is the median over up to 60 steps, or as
  * many as fit into two seconds, of a body at rest that is kept awake. */
 #include "server/base/clock.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/commands/preflight_report.h"
 #include "server/commands/scene_input.h"

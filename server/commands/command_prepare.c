@@ -3,7 +3,7 @@
  * a part of a scene. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/commands/tuning.h"
 #include "server/mesh/files/mesh_file.h"

@@ -1,6 +1,6 @@
 /* `palpate replay`: runs an input log against its scene and compares the state hashes. */
 #include "server/base/clock.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/commands/scene_input.h"
 #include "server/session/replay.h"

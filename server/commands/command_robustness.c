@@ -1,6 +1,6 @@
 /* `palpate robustness SCENE`: the cases of server/robustness on a scene, what happened and whether that meets the
  * criterion. Exit code 1 when a case failed or could not be judged. */
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/commands/scene_input.h"
 #include "server/figure/svg.h"

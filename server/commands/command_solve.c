@@ -1,6 +1,6 @@
 /* `palpate solve`: a load case of a problem -> displacements, the error against a reference, files for other tools. */
 #include "server/base/clock.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/figure/plot.h"
 #include "server/mesh/files/mesh_file.h"

@@ -4,7 +4,7 @@
 #include "server/base/clock.h"
 #include "server/base/machine.h"
 #include "server/calibrate/journal.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/json_reader.h"

@@ -1,6 +1,6 @@
 /* Flags and configuration: what each source may say, which one wins, and what is refused with which words. */
 #include "server/cli/config.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "tests/check.h"
 
 #include <fcntl.h>
@@ -22,8 +22,7 @@ static int parse(bool with_config, char **word)
                              {"--count", "N", PAL_FLAG_COUNT, &count, 1, 9, "a count"},
                              {"--on", NULL, PAL_FLAG_SWITCH, &on, 0, 0, "a switch"},
                              {"-o", "TEXT", PAL_FLAG_TEXT, &text, 0, 0, "a text"}};
-    const pal_flag_table table = {
-        .usage = "try", .about = "", PAL_FLAGS(flag), .max_operand = 2, .config = with_config ? &config : NULL};
+    const pal_flag_table table = {.usage = "try", .about = "", PAL_FLAGS(flag), .max_operand = 2};
     int argc = 0;
     while (word[argc]) argc++;
     number = 1, count = 2, on = false, text = NULL, n_operand = 0;
@@ -32,7 +31,8 @@ static int parse(bool with_config, char **word)
     if (!file || old < 0) return -100;
     fflush(stderr);
     dup2(fileno(file), STDERR_FILENO);
-    int code = pal_flags_parse(&table, argc, word, &common, operand, &n_operand);
+    int code = with_config ? pal_config_parse_flags(&table, &config, argc, word, &common, operand, &n_operand)
+                           : pal_flags_parse(&table, argc, word, &common, operand, &n_operand);
     fflush(stderr);
     dup2(old, STDERR_FILENO);
     close(old);
@@ -60,7 +60,7 @@ static void values_may_stand_apart_or_behind_an_equal_sign(void)
     CHECK_TEXT(text, "-dash");
     CHECK_INT(n_operand, 2);
     CHECK_TEXT(operand[1], "b");
-    CHECK_TEXT(common.command, "try");
+    CHECK_TEXT(common.program, "palpate try");
     CHECK_TEXT(output, "");
     CHECK_INT(PARSE("--quiet", "--", "--on", "-"), -1);
     CHECK(!on && common.quiet);
