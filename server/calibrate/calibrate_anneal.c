@@ -86,8 +86,6 @@ static void make_box(fit *f, const double *theta)
     }
 }
 
-/* ---- evaluations ---- */
-
 static void evaluate_one(void *user, int worker, int index)
 {
     fit *f = user;

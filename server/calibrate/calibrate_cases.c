@@ -28,8 +28,6 @@ static bool is(const char *word, const char *what)
     return word && !strcmp(word, what);
 }
 
-/* ---- which cases ---- */
-
 static pal_err add_case(job *j, const char *id, bool fit)
 {
     pal_calibrate_cases *s = j->set;
@@ -64,8 +62,6 @@ static pal_err add_list(job *j, const char *list, bool fit)
     return PAL_ERR_OK;
 }
 
-/* ---- material ---- */
-
 static bool same(double a, double b)
 {
     return fabs(a - b) <= 1e-9 * fabs(b);
@@ -96,8 +92,6 @@ static pal_err settle_material(job *j)
     s->problem->material[0].poisson = poisson;
     return PAL_ERR_OK;
 }
-
-/* ---- truths ---- */
 
 static bool answers(const job *j, int index, const pal_problem_reference *r)
 {
@@ -161,8 +155,6 @@ static pal_err choose_truths(job *j)
     }
     return PAL_ERR_OK;
 }
-
-/* ---- the body ---- */
 
 /* refuses points (frame of the file) far outside the surface's box */
 static pal_err check_box(const job *j, int index)

@@ -48,8 +48,6 @@ static double component_ms(cost *c, int component)
     return component < PAL_FRAME_COMPONENT_MAX ? pal_median(c->component_ms[component], c->n_step) : 0;
 }
 
-/* ---- what calls for an effect ---- */
-
 /* The effects that a model adds are in the table; of the others the stage determines which entry adds them, so that a
  * new effect needs no line here. */
 

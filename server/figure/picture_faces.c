@@ -52,8 +52,6 @@ static int count_seen(const pal_picture_mesh *m, const pal_picture_axes *axes)
     return n;
 }
 
-/* ---- fewer triangles ---- */
-
 typedef struct cell {
     uint64_t key;
     int32_t vertex;
@@ -138,8 +136,6 @@ pal_err pal_picture_mesh_prepare(pal_picture_mesh *m, const pal_picture_axes *ax
     }
     return PAL_ERR_OK;
 }
-
-/* ---- pieces ---- */
 
 typedef struct face {
     double p[3][3]; /* projected corners */
