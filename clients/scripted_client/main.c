@@ -288,8 +288,7 @@ int main(int argc, char **argv)
                                            "every frame and measures the time\n"
                                            "from pose to frame. Exit code 1 when a check failed.\n",
                                   PAL_FLAGS(flag),
-                                  .min_operand = 1,
-                                  .max_operand = 1};
+                                  .operands = {1, 1}};
     const int code = pal_flags_parse(&table, argc, argv, &common, &base.url, NULL);
     if (code >= 0) return code;
     if (stall) base.stall_s = *stall ? atof(stall) : 3;

@@ -176,11 +176,11 @@ int pal_flags_parse(const pal_flag_table *table, int argc, char **argv, pal_flag
             int code = take(&p, argc, argv, &k);
             if (code >= 0) return code;
         } else {
-            if (n == table->max_operand) return pal_flags_wrong(p.common, "\"%.60s\" is one operand too many", word);
+            if (n == table->operands[1]) return pal_flags_wrong(p.common, "\"%.60s\" is one operand too many", word);
             operand[n++] = word;
         }
     }
-    if (n < table->min_operand)
+    if (n < table->operands[0])
         return pal_flags_wrong(p.common, "%s", n ? "an operand is missing" : "no operand is given");
     if (n_operand) *n_operand = n;
     return -1;

@@ -8,7 +8,7 @@
  *         {"--grid", NULL, PAL_FLAG_SWITCH, &grid, 0, 0, "keep the grid"},
  *     };
  *     const pal_flag_table table = {.usage = "prepare IN -o DIR", .about = "...", .example = "palpate prepare ...\n",
- *                                   PAL_FLAGS(flag), .min_operand = 1, .max_operand = 1};
+ *                                   PAL_FLAGS(flag), .operands = {1, 1}};
  *     int code = pal_flags_parse(&table, argc, argv, &common, in, &n_in);
  *     if (code >= 0) return code;
  *
@@ -46,7 +46,7 @@ typedef struct pal_flag_table {
         *example; /* command lines, each ends with \n; tests/house/test_examples.sh runs them in order; NULL: none */
     const pal_flag *flag;
     int n_flag;
-    int min_operand, max_operand;
+    int operands[2];  /* least and most */
     const char *note; /* the manual's last paragraph, ends with \n; NULL: none */
 } pal_flag_table;
 #define PAL_FLAGS(array) .flag = array, .n_flag = sizeof array / sizeof array[0] /* members of the table above */
@@ -57,7 +57,7 @@ typedef struct pal_flag_common {
     char program[40]; /* for messages: "palpate prepare" */
 } pal_flag_common;
 
-/* -1: continue; else the exit code: 0 after --help, 2 after one line about wrong usage. operand: room for max_operand;
+/* -1: continue; else the exit code: 0 after --help, 2 after one line about wrong usage. operand: room for the most;
  * NULL when that is 0. n_operand may be NULL */
 int pal_flags_parse(const pal_flag_table *table, int argc, char **argv, pal_flag_common *common, const char **operand,
                     int *n_operand);

@@ -50,8 +50,7 @@ int command_bench(int argc, char **argv)
                                   .about = about,
                                   .example = "palpate bench protocol\n",
                                   PAL_FLAGS(flag),
-                                  .min_operand = 1,
-                                  .max_operand = 2};
+                                  .operands = {1, 2}};
     pal_flag_common common;
     int code = pal_flags_parse(&table, argc, argv, &common, word, &n);
     if (code >= 0) return code;

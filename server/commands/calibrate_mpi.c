@@ -430,8 +430,7 @@ static int parse(job *j, int argc, char **argv)
                                       "mpirun --oversubscribe -n 2 palpate-calibrate-mpi deploy/problems/gear.json "
                                       "--case twist --resolution 8 --evaluations 40 --journal gear.txt -o fits\n",
                                   PAL_FLAGS(flag),
-                                  .min_operand = 1,
-                                  .max_operand = MAX_PROBLEM};
+                                  .operands = {1, MAX_PROBLEM}};
     pal_calibrate_default(&j->options);
     j->options.voxel.resolution = 0;
     j->n_worker = 1;

@@ -321,7 +321,7 @@ int command_cells(int argc, char **argv)
                                              "palpate cells block --cells 3,2,2 --size-m 0.12,0.06,0.06 -o "
                                              "block.palcells\n",
                                   PAL_FLAGS(flag),
-                                  .max_operand = 1};
+                                  .operands = {0, 1}};
     pal_flag_common common;
     const char *word[1] = {NULL};
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);

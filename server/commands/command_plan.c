@@ -231,8 +231,7 @@ int command_plan(int argc, char **argv)
             "SCENE is a scene.json, its folder, control cells (.palcells), a surface or a scan.\n",
         .example = "palpate prepare --procedural -o organ\n"
                    "palpate plan organ/scene.json\n",
-        .min_operand = 1,
-        .max_operand = 1};
+        .operands = {1, 1}};
     pal_flag_common common;
     const char *word[1];
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);

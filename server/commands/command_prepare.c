@@ -441,7 +441,7 @@ int command_prepare(int argc, char **argv)
                                              "palpate prepare deploy/problems/gear.obj --model fem --hold 12 -o gear\n"
                                              "palpate prepare --shape stomach -o stomach\n",
                                   PAL_FLAGS(flag),
-                                  .max_operand = 1};
+                                  .operands = {0, 1}};
     pal_flag_common common;
     const char *in[1] = {NULL};
     int n_in = 0, code = pal_flags_parse(&table, argc, argv, &common, in, &n_in);

@@ -168,8 +168,7 @@ int command_robustness(int argc, char **argv)
                                   .example = "palpate prepare --shape sphere --resolution 6 --model fem -o ball\n"
                                              "palpate robustness ball/scene.json --only meganewton --seconds 20\n",
                                   PAL_FLAGS(flag),
-                                  .min_operand = 1,
-                                  .max_operand = 1};
+                                  .operands = {1, 1}};
     pal_flag_common common;
     const char *word[1];
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);

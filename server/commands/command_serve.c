@@ -396,7 +396,7 @@ int command_serve(int argc, char **argv)
                                              "palpate cells chair -o chair.palcells\n"
                                              "palpate serve chair.palcells --port 0 --seconds 2\n",
                                   PAL_FLAGS(flag),
-                                  .max_operand = MAX_SESSIONS};
+                                  .operands = {0, MAX_SESSIONS}};
     int code = pal_config_parse_flags(&table, &run.config, argc, argv, &run.common, input, &n_input);
     if (code >= 0) return code;
     if (help_protocol) {

@@ -491,8 +491,7 @@ int command_solve(int argc, char **argv)
                                              "palpate solve deploy/problems/beam.json --case tip --resolution 8,16 "
                                              "--element hex8_bbar,tet4 --plot error.svg\n",
                                   PAL_FLAGS(flag),
-                                  .min_operand = 1,
-                                  .max_operand = 1};
+                                  .operands = {1, 1}};
     pal_flag_common common;
     int n = 0, code = pal_flags_parse(&flags, argc, argv, &common, &args.problem, &n);
     if (code >= 0) return code;

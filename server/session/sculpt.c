@@ -248,10 +248,7 @@ pal_err pal_sculptor_prepare(const pal_sculptor *sculptor, const pal_scene *scen
     const pal_sculptor *s = sculptor;
     pal_sculpt_edit *edit = calloc(1, sizeof *edit);
     if (!edit) return PAL_ERR_MEMORY;
-    edit->kind = command->kind;
-    edit->from = &s->now.cells;
-    edit->body = s->body;
-    edit->cut = s->cut;
+    *edit = (pal_sculpt_edit){.kind = command->kind, .from = &s->now.cells, .body = s->body, .cut = s->cut};
     pal_err err = execute(s, command, edit, diag);
     if (!err) err = make_room(s, edit);
     if (!err) err = make_scene(s, scene, edit);

@@ -101,8 +101,7 @@ static void flags_are_taken_from_the_table_and_the_rest_refused(void)
                              {"--rate", "HZ", PAL_FLAG_NUMBER, &rate, 1, 100, ""},
                              {"--name", "N", PAL_FLAG_TEXT, &name, 0, 0, ""},
                              {"--stall", "S", PAL_FLAG_OPTIONAL, &stall, 0, 0, ""}};
-    const pal_flag_table table = {
-        .program = "test", .usage = "URL", .about = "", PAL_FLAGS(flag), .min_operand = 1, .max_operand = 1};
+    const pal_flag_table table = {.program = "test", .usage = "URL", .about = "", PAL_FLAGS(flag), .operands = {1, 1}};
     char *good[] = {"test", "--rate=7", "url", "--stall", "--loud", "--name", "Ada"};
     CHECK_INT(pal_flags_parse(&table, 7, good, &common, operand, NULL), -1);
     CHECK(loud && rate == 7);

@@ -22,7 +22,7 @@ static int parse(bool with_config, char **word)
                              {"--count", "N", PAL_FLAG_COUNT, &count, 1, 9, "a count"},
                              {"--on", NULL, PAL_FLAG_SWITCH, &on, 0, 0, "a switch"},
                              {"-o", "TEXT", PAL_FLAG_TEXT, &text, 0, 0, "a text"}};
-    const pal_flag_table table = {.usage = "try", .about = "", PAL_FLAGS(flag), .max_operand = 2};
+    const pal_flag_table table = {.usage = "try", .about = "", PAL_FLAGS(flag), .operands = {0, 2}};
     int argc = 0;
     while (word[argc]) argc++;
     number = 1, count = 2, on = false, text = NULL, n_operand = 0;
