@@ -8,7 +8,7 @@
 #include "server/base/clock.h"
 #include "server/bench/bench.h"
 #include "server/bench/bench_body.h"
-#include "server/mesh/geometry/organ.h"
+#include "server/mesh/geometry/procedural.h"
 #include "server/num/median.h"
 
 #include <math.h>

@@ -9,7 +9,7 @@
 #include "server/bench/bench_body.h"
 
 #include "server/base/clock.h"
-#include "server/mesh/geometry/organ.h"
+#include "server/mesh/geometry/procedural.h"
 
 #include "server/num/median.h"
 #include <math.h>
