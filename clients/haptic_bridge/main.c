@@ -2,7 +2,6 @@
  * one), triple buffer between them. Ends with zero force. SIGUSR1 is the emergency stop, SIGUSR2 re-arms. */
 #include "clients/haptic_bridge/bridge_net.h"
 #include "clients/haptic_bridge/device_virtual.h"
-#include "clients/link/client_text.h"
 #include "clients/link/end_condition.h"
 #include "server/base/flags.h"
 #include "server/base/json_members.h"
@@ -19,7 +18,7 @@
 #include <unistd.h>
 
 typedef struct bridge {
-    const char *device, *tool, *hand, *script, *origin, *up, *options;
+    const char *device, *tool, *hand, *script, *options;
     double seconds;
     bool list, doctor, stdin_stop;
     pal_flag_common common;
@@ -97,17 +96,15 @@ static pal_err main_workspace(bridge *b, pal_diagnostic *diag)
     pal_bridge_net_options *net = &b->net_options;
     pal_servo_options *o = &net->servo;
     double ex[3], ey[3];
-    if (!pal_client_parse_vector(b->up, net->up) || !pal_unit3(net->up, net->up, 1e-9))
-        return PAL_REFUSE(diag, "--up wants three numbers, not \"%s\"", b->up);
+    if (!pal_unit3(net->up, net->up, 1e-9)) return PAL_REFUSE(diag, "--up is no direction");
     const double other[3] = {fabs(net->up[0]) < 0.9, fabs(net->up[0]) >= 0.9, 0};
     pal_cross3(ey, net->up, other);
     pal_unit3(ey, ey, 1e-9);
     pal_cross3(ex, ey, net->up);
     for (int k = 0; k < 3; k++)
         o->rotation[3 * k] = ex[k], o->rotation[3 * k + 1] = ey[k], o->rotation[3 * k + 2] = net->up[k];
-    net->has_origin = b->origin != NULL;
-    if (b->origin && !pal_client_parse_vector(b->origin, o->origin_m))
-        return PAL_REFUSE(diag, "--origin wants three numbers, not \"%s\"", b->origin);
+    net->has_origin = !isnan(o->origin_m[0]);
+    if (!net->has_origin) pal_set3(o->origin_m, 0, 0, 0);
     return PAL_ERR_OK;
 }
 
@@ -124,7 +121,7 @@ static void main_json(const bridge *b, const pal_servo_timing *t, const pal_serv
     const char *forces = t->rt_flags & PAL_RT_OFF       ? "off: servo loop is late"
                          : t->rt_flags & PAL_RT_LIMITED ? "limited: servo loop is late"
                                                         : "full";
-    pal_client_print_json(PAL_JSON(
+    cJSON *report = PAL_JSON(
         {"ok", JSON_BOOL(reason == NULL)}, {"reason", reason ? JSON_TEXT(reason) : NULL},
         {"device", JSON_TEXT(b->net_options.servo.info.name)}, {"rate_hz", JSON_NUMBER(b->net_options.servo.rate_hz)},
         {"fifo", JSON_BOOL(t->rt_flags & PAL_RT_FIFO)}, {"memory_locked", JSON_BOOL(t->rt_flags & PAL_RT_LOCKED)},
@@ -138,7 +135,8 @@ static void main_json(const bridge *b, const pal_servo_timing *t, const pal_serv
         {"models_old", JSON_NUMBER(v->n_model_old)}, {"stale", JSON_NUMBER(v->n_stale)},
         {"faults", JSON_NUMBER(v->n_fault)}, {"not_finite", JSON_NUMBER(v->n_not_finite)},
         {"poses", JSON_NUMBER(c->n_pose)}, {"tool", JSON_NUMBER(c->tool)}, {"joined", JSON_BOOL(c->joined)},
-        {"position_m", cJSON_CreateDoubleArray(v->position_m, 3)}));
+        {"position_m", cJSON_CreateDoubleArray(v->position_m, 3)});
+    (void)pal_json_write(stdout, report);
 }
 
 static void main_table(const bridge *b, const pal_servo_timing *t, const pal_servo_view *v,
@@ -258,15 +256,16 @@ static int main_doctor(bridge *b)
 
 int main(int argc, char **argv)
 {
-    bridge b = {.device = "virtual:touch",
-                .tool = "any",
-                .hand = "average",
-                .script = "press-hold",
-                .up = "0,0,1",
-                .net_options = {.server = "ws://127.0.0.1:8090/ws",
-                                .session = "main",
-                                .name = "haptic bridge",
-                                .servo = {.rate_hz = 1000, .force_cap_N = 3, .scale = 1, .force_scale = 1}}};
+    bridge b = {
+        .device = "virtual:touch",
+        .tool = "any",
+        .hand = "average",
+        .script = "press-hold",
+        .net_options = {.server = "ws://127.0.0.1:8090/ws",
+                        .session = "main",
+                        .name = "haptic bridge",
+                        .up = {0, 0, 1},
+                        .servo = {.rate_hz = 1000, .force_cap_N = 3, .scale = 1, .force_scale = 1, .origin_m = {NAN}}}};
     pal_bridge_net_options *net = &b.net_options;
     pal_servo_options *servo = &net->servo;
     const pal_flag flag[] = {
@@ -285,8 +284,8 @@ int main(int argc, char **argv)
         {"--until", "NAME=N,...", PAL_FLAG_TEXT, &b.until_text, 0, 0,
          "end before that once all is reached: models, poses, force_N, stale, free=1"},
         {"--force-cap", "N", PAL_FLAG_NUMBER, &servo->force_cap_N, 0, 20, "largest force (3, and the device's peak)"},
-        {"--origin", "X,Y,Z", PAL_FLAG_TEXT, &b.origin, 0, 0, "world place of the workspace's centre, m"},
-        {"--up", "X,Y,Z", PAL_FLAG_TEXT, &b.up, 0, 0, "world direction of the device's up (0,0,1)"},
+        {"--origin", "X,Y,Z", PAL_FLAG_VECTOR, servo->origin_m, 0, 0, "world place of the workspace's centre, m"},
+        {"--up", "X,Y,Z", PAL_FLAG_VECTOR, net->up, 0, 0, "world direction of the device's up (0,0,1)"},
         {"--scale", "S", PAL_FLAG_NUMBER, &servo->scale, 0.01, 100, "world metres per device metre (1)"},
         {"--force-scale", "S", PAL_FLAG_NUMBER, &servo->force_scale, 0.01, 100, "device newtons per world newton (1)"},
         {"--pose-only", NULL, PAL_FLAG_SWITCH, &servo->pose_only, 0, 0, "no force"},

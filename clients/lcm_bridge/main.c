@@ -1,7 +1,6 @@
 /* palpate-lcm: a session on an LCM bus. A process of its own, because two forged datagrams can end any process that
  * subscribes with LCM 1.3.1; `palpate serve --lcm URL` starts it and starts it again. */
 #include "clients/lcm_bridge/lcm_bridge.h"
-#include "clients/link/client_text.h"
 #include "server/base/flags.h"
 #include "server/base/json_members.h"
 #include "server/base/log.h"
@@ -41,10 +40,10 @@ int main(int argc, char **argv)
         pal_link_run_for(loop, seconds);
     if (!err && common.json) {
         const pal_lcm_bridge_counts c = pal_lcm_bridge_count(bridge);
-        pal_client_print_json(
-            PAL_JSON({"frames", JSON_NUMBER(c.n_frame)}, {"frames_dropped", JSON_NUMBER(c.n_frame_dropped)},
-                     {"states", JSON_NUMBER(c.n_state)}, {"states_refused", JSON_NUMBER(c.n_state_refused)},
-                     {"models", JSON_NUMBER(c.n_model)}, {"statuses", JSON_NUMBER(c.n_status)}));
+        cJSON *report = PAL_JSON({"frames", JSON_NUMBER(c.n_frame)}, {"frames_dropped", JSON_NUMBER(c.n_frame_dropped)},
+                                 {"states", JSON_NUMBER(c.n_state)}, {"states_refused", JSON_NUMBER(c.n_state_refused)},
+                                 {"models", JSON_NUMBER(c.n_model)}, {"statuses", JSON_NUMBER(c.n_status)});
+        (void)pal_json_write(stdout, report);
     }
     const bool refused = !err && pal_lcm_bridge_count(bridge).refused;
     pal_link_loop_destroy(loop);

@@ -1,5 +1,4 @@
 /* palpate-client: scripted headless trainees against a server; load, latency, frame checks (scripted_client.h). */
-#include "clients/link/client_text.h"
 #include "clients/link/end_condition.h"
 #include "clients/scripted_client/scripted_client.h"
 #include "protocol/field_codec.h"
@@ -112,7 +111,7 @@ static void main_reported(void *user, const pal_order_result *reported)
                         {"epoch", JSON_NUMBER(r->epoch)}, {"vertices", JSON_NUMBER(r->n_vertex)});
     for (uint32_t i = 0; r->answer && i < r->answer->n_arg; i++)
         cJSON_AddNumberToObject(o, r->answer->arg[i].key, r->answer->arg[i].value);
-    pal_client_print_json(o);
+    (void)pal_json_write(stdout, o);
 }
 
 /* fields a second that one client got */
@@ -137,7 +136,7 @@ static void main_json(totals *sum, int n_client, bool ok, const char *reason)
                           {"triangles", JSON_NUMBER(sum->triangles)}, {"slots", JSON_NUMBER(sum->slots)});
     for (int i = 0; i < PAL_FAULT_COUNT; i++)
         cJSON_AddNumberToObject(faults, pal_fault_name((pal_fault)i), (double)sum->fault[i]);
-    pal_client_print_json(PAL_JSON(
+    cJSON *report = PAL_JSON(
         {"ok", JSON_BOOL(ok)}, {"reason", ok ? NULL : JSON_TEXT(reason)}, {"clients", JSON_NUMBER(n_client)},
         {"joined", JSON_NUMBER(sum->joined)}, {"with_tool", JSON_NUMBER(sum->with_tool)},
         {"seconds", JSON_NUMBER(sum->seconds)}, {"frames", JSON_NUMBER(sum->frames)},
@@ -152,7 +151,8 @@ static void main_json(totals *sum, int n_client, bool ok, const char *reason)
         {"orders", sum->n_order ? JSON_NUMBER(sum->n_order) : NULL},
         {"orders_refused", sum->n_order ? JSON_NUMBER(sum->n_refused) : NULL},
         {"old_cycles_after_stall", sum->stalls_done ? JSON_NUMBER(sum->old_after_stall) : NULL},
-        {"closed", sum->closed ? JSON_TEXT(sum->closed) : NULL}, {"faults", faults}));
+        {"closed", sum->closed ? JSON_TEXT(sum->closed) : NULL}, {"faults", faults});
+    (void)pal_json_write(stdout, report);
 }
 
 static void main_table(totals *sum, int n_client)
@@ -256,11 +256,15 @@ static int main_read(const pal_flag_common *common, const char *sculpt, pal_orde
 
 int main(int argc, char **argv)
 {
-    const char *tool = "any", *up = "0,0,1", *stall = NULL, *sculpt = NULL, *until = NULL;
+    const char *tool = "any", *stall = NULL, *sculpt = NULL, *until = NULL;
     double seconds = 5;
     pal_flag_common common;
-    pal_scripted_client_options base = {
-        .name = "trainee", .script = "press", .tool = PAL_WIRE_TOOL_ANY, .rate_hz = 120, .n_client = 1};
+    pal_scripted_client_options base = {.name = "trainee",
+                                        .script = "press",
+                                        .tool = PAL_WIRE_TOOL_ANY,
+                                        .rate_hz = 120,
+                                        .n_client = 1,
+                                        .up = {0, 0, 1}};
     const pal_flag flag[] = {
         {"--script", "NAME", PAL_FLAG_TEXT, &base.script, 0, 0, "press | pull | circle | idle | FILE (press)"},
         {"--name", "NAME", PAL_FLAG_TEXT, &base.name, 0, 0, "name among the members"},
@@ -274,7 +278,7 @@ int main(int argc, char **argv)
         {"--rate", "HZ", PAL_FLAG_NUMBER, &base.rate_hz, 1, 240, "poses per second (120)"},
         {"--clients", "N", PAL_FLAG_COUNT, &base.n_client, 1, CLIENTS_MAX, "so many at once (1)"},
         {"--depth", "M", PAL_FLAG_NUMBER, &base.depth_m, 1e-5, 1, "depth of a press in metres (8 % of the box)"},
-        {"--up", "X,Y,Z", PAL_FLAG_TEXT, &up, 0, 0, "from which side the organ is touched (0,0,1)"},
+        {"--up", "X,Y,Z", PAL_FLAG_VECTOR, base.up, 0, 0, "from which side the organ is touched (0,0,1)"},
         {"--field", "NAME", PAL_FLAG_TEXT, &base.field, 0, 0,
          "ask for displacement | von_mises | energy | stiffness | strain | distortion, check it"},
         {"--sculpt", "FILE", PAL_FLAG_TEXT, &sculpt, 0, 0,
@@ -293,8 +297,8 @@ int main(int argc, char **argv)
     if (code >= 0) return code;
     if (stall) base.stall_s = *stall ? atof(stall) : 3;
     if (strcmp(tool, "any")) base.tool = atoi(tool);
-    if (!pal_client_parse_vector(up, base.up) || !pal_unit3(base.up, base.up, 1e-9) || base.tool >= PAL_WIRE_TOOL_MAX)
-        return pal_flags_wrong(&common, "--up wants three numbers, --tool an index or any");
+    if (!pal_unit3(base.up, base.up, 1e-9) || base.tool >= PAL_WIRE_TOOL_MAX)
+        return pal_flags_wrong(&common, "--up wants a direction, --tool an index or any");
     if (base.field && (pal_wire_field_find(base.field) == PAL_WIRE_FIELD_COUNT || !strcmp(base.field, "none")))
         return pal_flags_wrong(
             &common, "--field wants displacement, von_mises, energy, stiffness, strain or distortion, not \"%s\"",

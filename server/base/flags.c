@@ -68,6 +68,19 @@ static pal_err read_number(const pal_flag *flag, const char *text, const char *w
     return PAL_ERR_OK;
 }
 
+static pal_err read_vector(const char *text, const char *where, double out[3], pal_diagnostic *diag)
+{
+    const char *rest = text;
+    for (int i = 0; i < 3; i++) {
+        char *end;
+        out[i] = strtod(rest, &end);
+        if (end == rest || !isfinite(out[i]) || *end != (i < 2 ? ',' : 0))
+            return PAL_REFUSE(diag, "%s: \"%.60s\" is not three numbers X,Y,Z", where, text);
+        rest = end + 1;
+    }
+    return PAL_ERR_OK;
+}
+
 pal_err pal_flag_read(const pal_flag *flag, const char *text, const char *where, void *out, pal_diagnostic *diag)
 {
     char list[200];
@@ -82,6 +95,7 @@ pal_err pal_flag_read(const pal_flag *flag, const char *text, const char *where,
         list_words(flag->value, list, sizeof list);
         return PAL_REFUSE(diag, "%s: \"%.60s\" is not %s", where, text, list);
     }
+    if (flag->kind == PAL_FLAG_VECTOR) return read_vector(text, where, out, diag);
     const bool number = flag->kind == PAL_FLAG_NUMBER || flag->kind == PAL_FLAG_COUNT;
     return number ? read_number(flag, text, where, out, diag) : PAL_ERR_OK;
 }

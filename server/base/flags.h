@@ -27,7 +27,8 @@ typedef enum pal_flag_kind {
     PAL_FLAG_OPTIONAL, /* out: const char **; "" for the flag alone, as last word or before another flag */
     PAL_FLAG_WORD,     /* out: const char **; one of the words of value, "on|off" */
     PAL_FLAG_NUMBER,   /* out: double *                                          */
-    PAL_FLAG_COUNT     /* out: int *                                             */
+    PAL_FLAG_COUNT,    /* out: int *                                             */
+    PAL_FLAG_VECTOR    /* out: double [3]; "X,Y,Z"                               */
 } pal_flag_kind;
 
 typedef struct pal_flag {
@@ -68,7 +69,7 @@ int pal_flags_wrong(const pal_flag_common *common, const char *format, ...) __at
 int pal_flag_word(const char *words, const char *text);
 /* The next word of a list with commas, cut into out; empty words are words. False: none is left (*list NULL). [any] */
 bool pal_flag_next_word(const char **list, char *out, size_t n_byte);
-/* text -> the bool ("true", "1", "false", "0"), double or int at out; a text or word is only checked, and out unused.
- * REFUSED: "where: sentence". [any] */
+/* text -> the bool ("true", "1", "false", "0"), double, int or three doubles at out; a text or word is only checked,
+ * and out unused. REFUSED: "where: sentence". [any] */
 pal_err pal_flag_read(const pal_flag *flag, const char *text, const char *where, void *out, pal_diagnostic *diag);
 #endif

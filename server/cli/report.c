@@ -30,10 +30,7 @@ int pal_report_refusal(const pal_flag_common *common, pal_err err, const pal_dia
 
 int pal_report_json(const pal_flag_common *common, cJSON *object)
 {
-    char *text = object ? cJSON_PrintUnformatted(object) : NULL;
-    bool good = text && printf("%s\n", text) >= 0 && fflush(stdout) == 0;
-    cJSON_free(text);
-    cJSON_Delete(object);
+    bool good = pal_json_write(stdout, object);
     if (!good) fprintf(stderr, "%s: the JSON object could not be written\n", common->program);
     return good ? 0 : 3;
 }

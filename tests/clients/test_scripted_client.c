@@ -1,6 +1,5 @@
 /* What the client programs are made of and needs no server: addresses, flags, scripts, samples. */
 #include "clients/link/asset_store.h"
-#include "clients/link/client_text.h"
 #include "clients/link/end_condition.h"
 #include "clients/link/link.h"
 #include "clients/scripted_client/orders.h"
@@ -117,10 +116,6 @@ static void flags_are_taken_from_the_table_and_the_rest_refused(void)
         char *words[3] = {bad[i][0], bad[i][1], bad[i][2]};
         CHECK_INT(pal_flags_parse(&table, 3, words, &common, operand, NULL), 2);
     }
-    double triple[3];
-    CHECK(pal_client_parse_vector("1,-2,3e-1", triple) && triple[1] == -2 && triple[2] == 0.3);
-    CHECK(!pal_client_parse_vector("1,2", triple) && !pal_client_parse_vector("1,2,3,4", triple) &&
-          !pal_client_parse_vector("1,2,nan", triple));
 }
 
 static void scripts_go_through_their_points_and_repeat(void)
