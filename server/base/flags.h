@@ -43,8 +43,7 @@ typedef struct pal_flag {
 typedef struct pal_flag_table {
     const char *program;       /* NULL: a command of palpate, whose name is argv[0] */
     const char *usage, *about; /* "prepare IN -o DIR [flags]"; paragraphs of the manual, each ends with \n */
-    const char
-        *example; /* command lines, each ends with \n; tests/house/test_examples.sh runs them in order; NULL: none */
+    const char *example; /* command lines, each ends with \n, which tests/house/test_examples.sh runs; NULL: none */
     const pal_flag *flag;
     int n_flag;
     int operands[2];  /* least and most */

@@ -27,7 +27,7 @@ enum { BENCHES = sizeof bench_table / sizeof bench_table[0] };
 
 static int run_bench(int index, const char *argument, const pal_flag_common *common)
 {
-    bench_report r = {.argument = argument, .json = common->json, .root = cJSON_CreateObject()};
+    pal_table r = {.argument = argument, .silent = common->json, .root = cJSON_CreateObject()};
     pal_diagnostic diag = {""};
     cJSON_AddBoolToObject(r.root, "ok", true);
     cJSON_AddStringToObject(r.root, "bench", bench_table[index].name);

@@ -14,7 +14,6 @@
 
 enum { ENOUGH_NODES = 700, FINEST = 64 };
 
-/* input of every function of one reading */
 typedef struct job {
     const pal_calibrate_input *input;
     pal_calibrate_cases *set;

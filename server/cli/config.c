@@ -170,9 +170,9 @@ int pal_config_parse_flags(const pal_flag_table *own, pal_config *config, int ar
         (pal_flag){"--config", "FILE", PAL_FLAG_TEXT, &file, 0, 0, "JSON file of these keys (PALPATE_CONFIG, or none)"};
     pal_flag_table table = *own;
     table.flag = all, table.n_flag = (int)(flag - all);
-    table.note = "The file and the environment take the same keys (allow_remote, PALPATE_ALLOW_REMOTE). Flags override "
-                 "the\n"
-                 "environment, the environment overrides the file.\n";
+    table.note =
+        "The file and the environment take the same keys (allow_remote, PALPATE_ALLOW_REMOTE). Flags override\n"
+        "the environment, the environment overrides the file.\n";
     int code = pal_flags_parse(&table, argc, argv, common, operand, n_operand);
     if (code >= 0) return code;
     pal_config_default(config);

@@ -30,7 +30,6 @@ static const char about[] =
     "is refused is reported and the next one started. -o DIR: DIR/NAME.json with the constants of each\n"
     "(NAME_S.json with several seeds S).\n";
 
-/* the state of one process */
 typedef struct job {
     pal_flag_common common;
     const char *problem[MAX_PROBLEM];

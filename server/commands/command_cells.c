@@ -26,7 +26,6 @@ typedef struct arguments {
     bool list;
 } arguments;
 
-/* a solid: control cells, subdivided cells, figures */
 typedef struct outcome {
     char name[128];
     const pal_cell_model *model; /* NULL: another shape */
@@ -45,8 +44,6 @@ static void free_outcome(outcome *o)
     pal_subdivision_free(&o->made);
     pal_cell_elements_free(&o->elements);
 }
-
-/* ---- shapes ---- */
 
 /* a primitive: what its numbers of cells and its sizes mean, and their defaults */
 typedef struct primitive {
@@ -104,8 +101,6 @@ static pal_err make_primitive(const primitive *p, const double count[3], const d
         return pal_cells_torus(n[0], n[1], size_m[0], size_m[1], out, diag);
     }
 }
-
-/* ---- figures ---- */
 
 static pal_err measure(outcome *o, pal_diagnostic *diag)
 {
@@ -251,11 +246,9 @@ static int run(const pal_flag_common *common, outcome *o, const arguments *args,
     pal_err err = subdivide(o, args->n_level, rule, &diag);
     if (!err && args->file) err = write_file(o, args->file, &diag);
     if (err) return pal_report_refusal(common, err, &diag);
-    if (common->json) {
-        cJSON *object = as_json(o, args->rule);
-        if (args->file) cJSON_AddStringToObject(object, "file", args->file);
-        return pal_report_json(common, object);
-    }
+    if (common->json)
+        return pal_report_json(
+            common, PAL_JSON_ADD(as_json(o, args->rule), {"file", args->file ? JSON_TEXT(args->file) : NULL}));
     if (common->quiet) return 0;
     print(o, args->rule);
     if (args->file && ends_in(args->file, cell_end)) printf("wrote the cells to %s\n", args->file);

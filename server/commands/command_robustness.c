@@ -186,16 +186,12 @@ int command_robustness(int argc, char **argv)
     pal_err err = report ? pal_scene_input_open(word[0], &input, &diag) : PAL_ERR_MEMORY;
     const pal_scene *scene = input.studied.scene;
     if (!err) err = pal_diagnostic_prefix(&diag, pal_robustness_run(scene, &options, report, &diag), word[0]);
-    pal_report_progress(NULL, 0, &common);
     if (!err && picture) err = draw(report, scene->title, picture, &diag);
-    if (err) {
-        code = pal_report_refusal(&common, err, &diag);
-    } else {
-        code = common.json ? pal_report_json(&common, as_json(scene, &options, report)) : 0;
-        if (!common.json && !common.quiet && input.studied.summary[0]) printf("%s\n", input.studied.summary);
-        if (!common.json && !common.quiet) print(scene, report);
-        if (code == 0 && report->n_failed + report->n_undecided > 0) code = 1;
-    }
+    code = pal_report_end(&common, err, &diag, err || !common.json ? NULL : as_json(scene, &options, report));
+    bool prints = !err && !common.json && !common.quiet;
+    if (prints && input.studied.summary[0]) printf("%s\n", input.studied.summary);
+    if (prints) print(scene, report);
+    if (code == 0 && report->n_failed + report->n_undecided > 0) code = 1;
     pal_scene_input_close(&input);
     free(report);
     return code;

@@ -8,7 +8,6 @@
 enum { DIVIDE_MAX = 8, CLASSES_A_PIECE = 2 };
 static const double crease_cosine = 0.8; /* sharper than 37 degrees */
 
-/* an edge: its n sides in triangles */
 typedef struct edge {
     const pal_surface_side *side;
     int n;

@@ -8,7 +8,6 @@
 #include "server/net/tuning.h"
 #include "server/sim/world/pick.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

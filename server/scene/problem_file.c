@@ -3,7 +3,6 @@
 #include "server/scene/problem_file.h"
 
 #include "server/base/vec3.h"
-#include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/json_reader.h"
 #include "server/scene/tuning.h"
@@ -43,7 +42,6 @@ static pal_err check_numbers(const pal_json *at, const char *const *keys)
     return PAL_ERR_OK;
 }
 
-/* one of a NULL-terminated list of words */
 static pal_err read_word(const pal_json *at, const char *key, const char *const *words, char *out, size_t n_byte)
 {
     char list[160];

@@ -45,8 +45,6 @@ struct pal_sculpt_edit {
     pal_prepared mesh;
 };
 
-/* ---- shapes ---- */
-
 static void free_shape(shape *s)
 {
     pal_cells_free(&s->cells);
@@ -128,8 +126,6 @@ int pal_sculptor_redo_count(const pal_sculptor *sculptor)
     return sculptor->n_future;
 }
 
-/* ---- commands ---- */
-
 static pal_err paint(const pal_sculptor *s, const pal_stroke *stroke, shape *to, pal_diagnostic *diag)
 {
     PAL_TRY(pal_stroke_check(stroke, diag));
@@ -208,8 +204,6 @@ static pal_err execute(const pal_sculptor *s, const pal_sculpt *command, pal_scu
     }
     return PAL_REFUSE(diag, "there is no sculpting command %d", (int)command->kind);
 }
-
-/* ---- edits ---- */
 
 /* builds the scene with the body's new shape; the edit owns all that the body borrows */
 static pal_err make_scene(const pal_sculptor *s, const pal_scene *scene, pal_sculpt_edit *edit)
@@ -323,8 +317,6 @@ void pal_sculpt_edit_free(pal_sculpt_edit *edit)
     pal_prepared_free(&edit->mesh);
     free(edit);
 }
-
-/* ---- picking ---- */
 
 static double off_edge(const pal_cells *c, int32_t edge, const double at[3])
 {

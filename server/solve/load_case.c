@@ -80,14 +80,6 @@ static void align(const pal_problem *p, int resolution, const pal_surface *surfa
     }
 }
 
-/* share of the surface's volume that the filled voxels lack */
-static double missing(const pal_prepared *mesh)
-{
-    double sum = 0, cube = mesh->tets.edge_m * mesh->tets.edge_m * mesh->tets.edge_m;
-    for (int e = 0; e < mesh->hexes.n_hex; e++) sum += cube * (double)mesh->hexes.fill[e];
-    return 1 - sum / fabs(pal_surface_volume(&mesh->surface));
-}
-
 /* drops components without a support, as in the preparation of a scene (mesh/volume/loose_components.h) */
 static pal_err drop_loose(const pal_problem *p, pal_prepared *mesh, pal_diagnostic *diag)
 {
@@ -115,7 +107,7 @@ pal_err pal_case_voxels(const pal_problem *problem, const pal_surface *surface, 
     if (chosen) voxel.min_fill = how->fill ? PAL_DROP_FILL : 0.5;
     if (how->align) align(problem, how->resolution, surface, voxel.ahead);
     PAL_TRY(pal_prepared_make(surface, &voxel, out, &report, diag));
-    if (chosen && how->fill && missing(out) > PAL_MAX_MISSING) {
+    if (chosen && how->fill && pal_prepared_missing(out) > PAL_MAX_MISSING) {
         pal_prepared_free(out);
         voxel.min_fill = PAL_KEEP_FILL;
         PAL_TRY(pal_prepared_make(surface, &voxel, out, &report, diag));
@@ -163,7 +155,6 @@ int pal_case_shape_functions(const pal_body *body, int element, const double loc
     return n_corner;
 }
 
-/* one load being applied to the nodes */
 typedef struct job {
     const pal_problem *problem;
     const pal_problem_case *load_case;

@@ -297,14 +297,6 @@ static void align(const pal_body_def *body, const pal_surface *surface, int size
     }
 }
 
-/* part of the surface's volume outside the filled voxels */
-static double missing(const pal_prepared *mesh)
-{
-    double sum = 0, cube = mesh->tets.edge_m * mesh->tets.edge_m * mesh->tets.edge_m;
-    for (int e = 0; e < mesh->hexes.n_hex; e++) sum += cube * (double)mesh->hexes.fill[e];
-    return 1 - sum / fabs(pal_surface_volume(&mesh->surface));
-}
-
 /* drops components without support in voxels of this size, as preparation does */
 static pal_err drop_loose(const pal_body_def *body, const double up[3], pal_prepared *mesh, pal_diagnostic *diag)
 {
@@ -330,7 +322,7 @@ static pal_err fill_voxels(const pal_body_def *body, const double up[3], const p
     align(body, surface, size, voxel.ahead);
     pal_err err = pal_prepared_make(surface, &voxel, out, &report, &reason);
     /* thin parts consist of voxels with little inside */
-    if (!err && missing(out) > PAL_VOXEL_MAX_MISSING) {
+    if (!err && pal_prepared_missing(out) > PAL_VOXEL_MAX_MISSING) {
         pal_prepared_free(out);
         voxel.min_fill = PAL_FILL_MIN;
         err = pal_prepared_make(surface, &voxel, out, &report, &reason);
