@@ -8,7 +8,7 @@
 #include "server/base/clock.h"
 #include "server/bench/bench.h"
 #include "server/bench/bench_body.h"
-#include "server/mesh/geometry/organ.h"
+#include "server/mesh/geometry/procedural.h"
 #include "server/num/median.h"
 
 #include <math.h>
@@ -152,12 +152,12 @@ static const double max_share = 0.03;
 static const char not_timed[] = "search for inverted elements, caps of loads and displacements, choice of sub-steps, "
                                 "refusal of bad numbers, corrections of contacts";
 
-static void add_case(bench_report *r, const guards *c)
+static void add_case(pal_table *r, const guards *c)
 {
     /* a negative difference is noise */
     double checks_ms = c->finite_ms + fmax(0, c->energy_ms), share = (c->component_ms + checks_ms) / c->with_ms;
     const char *verdict = c->n_safeguard ? "something went wrong" : share <= max_share ? "ok" : "too much";
-    BENCH_ROW(r, TEXT("model", "model", -18, c->model), NUMBER("dofs", "dofs", 8, 0, c->n_point),
+    TABLE_ROW(r, TEXT("model", "model", -18, c->model), NUMBER("dofs", "dofs", 8, 0, c->n_point),
               NUMBER(NULL, "sub-steps", 10, 0, c->n_sub), VALUE("safeguards", c->n_safeguard),
               NUMBER("with_ms", "ms with", 12, 4, c->with_ms), NUMBER("without_ms", "ms without", 12, 4, c->without_ms),
               NUMBER("component_share", "component", 9, 4, c->component_ms / c->with_ms),
@@ -165,13 +165,13 @@ static void add_case(bench_report *r, const guards *c)
               TEXT("verdict", "", 0, verdict));
 }
 
-pal_err bench_guards(bench_report *r, pal_diagnostic *diag)
+pal_err bench_guards(pal_table *r, pal_diagnostic *diag)
 {
     bodies b = {0};
     guards one;
-    BENCH_ROW(r, VALUE("max_share", max_share), TEXT("not_timed", NULL, 0, not_timed));
-    bench_note(r, "shares of a step, wanted at most %g together. Not timed: %s", max_share, not_timed);
-    bench_list(r, "cases");
+    TABLE_ROW(r, VALUE("max_share", max_share), TEXT("not_timed", NULL, 0, not_timed));
+    pal_table_note(r, "shares of a step, wanted at most %g together. Not timed: %s", max_share, not_timed);
+    pal_table_list(r, "cases");
     pal_err err = make_bodies(&b, diag);
     for (int k = 0; k < N_CASE && !err; k++) {
         err = measure(&b, k, &one, diag);

@@ -1,6 +1,6 @@
 /* `palpate robustness SCENE`: the cases of server/robustness on a scene, what happened and whether that meets the
  * criterion. Exit code 1 when a case failed or could not be judged. */
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/commands/scene_input.h"
 #include "server/figure/svg.h"
@@ -168,8 +168,7 @@ int command_robustness(int argc, char **argv)
                                   .example = "palpate prepare --shape sphere --resolution 6 --model fem -o ball\n"
                                              "palpate robustness ball/scene.json --only meganewton --seconds 20\n",
                                   PAL_FLAGS(flag),
-                                  .min_operand = 1,
-                                  .max_operand = 1};
+                                  .operands = {1, 1}};
     pal_flag_common common;
     const char *word[1];
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
@@ -187,16 +186,12 @@ int command_robustness(int argc, char **argv)
     pal_err err = report ? pal_scene_input_open(word[0], &input, &diag) : PAL_ERR_MEMORY;
     const pal_scene *scene = input.studied.scene;
     if (!err) err = pal_diagnostic_prefix(&diag, pal_robustness_run(scene, &options, report, &diag), word[0]);
-    pal_report_progress(NULL, 0, &common);
     if (!err && picture) err = draw(report, scene->title, picture, &diag);
-    if (err) {
-        code = pal_report_refusal(&common, err, &diag);
-    } else {
-        code = common.json ? pal_report_json(&common, as_json(scene, &options, report)) : 0;
-        if (!common.json && !common.quiet && input.studied.summary[0]) printf("%s\n", input.studied.summary);
-        if (!common.json && !common.quiet) print(scene, report);
-        if (code == 0 && report->n_failed + report->n_undecided > 0) code = 1;
-    }
+    code = pal_report_end(&common, err, &diag, err || !common.json ? NULL : as_json(scene, &options, report));
+    bool prints = !err && !common.json && !common.quiet;
+    if (prints && input.studied.summary[0]) printf("%s\n", input.studied.summary);
+    if (prints) print(scene, report);
+    if (code == 0 && report->n_failed + report->n_undecided > 0) code = 1;
     pal_scene_input_close(&input);
     free(report);
     return code;

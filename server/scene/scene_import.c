@@ -12,7 +12,7 @@
 #include "server/base/utf8.h"
 #include "server/base/vec3.h"
 #include "server/mesh/files/mesh_file.h"
-#include "server/mesh/geometry/organ.h"
+#include "server/mesh/geometry/procedural.h"
 #include "server/mesh/scan/label_volume.h"
 #include "server/num/sort.h"
 #include "server/scene/subdivision_file.h"

@@ -147,7 +147,6 @@ int pal_case_shape_functions(const pal_body *body, int element, const double loc
     return n_corner;
 }
 
-/* one load being applied to the nodes */
 typedef struct job {
     const pal_problem *problem;
     const pal_problem_case *load_case;

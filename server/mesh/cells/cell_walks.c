@@ -107,8 +107,7 @@ static void number_boundary(const pal_cells *c, const bool *away, int32_t *numbe
         if (number[v] == 0) number[v] = s->n_vertex++;
 }
 
-pal_err pal_cells_boundary_of(const pal_cells *c, const bool *away, pal_surface *out, int32_t **vertex,
-                              int32_t **face)
+pal_err pal_cells_boundary_of(const pal_cells *c, const bool *away, pal_surface *out, int32_t **vertex, int32_t **face)
 {
     pal_surface s = {0};
     pal_err err = PAL_ERR_OK;

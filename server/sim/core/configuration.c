@@ -309,20 +309,12 @@ static pal_err drop_loose(const pal_body_def *body, const double up[3], pal_prep
     return err;
 }
 
-/* part of the surface's volume outside the filled voxels */
-static double missing(const pal_prepared *mesh)
-{
-    double sum = 0, cube = mesh->tets.edge_m * mesh->tets.edge_m * mesh->tets.edge_m;
-    for (int e = 0; e < mesh->hexes.n_hex; e++) sum += cube * (double)mesh->hexes.fill[e];
-    return 1 - sum / fabs(pal_surface_volume(&mesh->surface));
-}
-
 pal_err pal_filled_voxels_make(const pal_surface *surface, pal_voxel_options *voxel, pal_prepared *out,
                                pal_prepare_report *report, pal_diagnostic *diag)
 {
     voxel->min_fill = PAL_VOXEL_DROP_FILL;
     PAL_TRY(pal_prepared_make(surface, voxel, out, report, diag));
-    if (missing(out) <= PAL_VOXEL_MAX_MISSING) return PAL_ERR_OK;
+    if (pal_prepared_missing(out) <= PAL_VOXEL_MAX_MISSING) return PAL_ERR_OK;
     /* thin parts consist of voxels with little inside */
     pal_prepared_free(out);
     voxel->min_fill = PAL_FILL_MIN;
