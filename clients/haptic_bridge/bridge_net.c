@@ -314,10 +314,7 @@ pal_err pal_bridge_net_open(pal_link_loop *loop, pal_servo *servo, pal_servo_thr
 {
     pal_bridge_net *n = calloc(1, sizeof *n);
     if (!n) return PAL_ERR_MEMORY;
-    n->loop = loop;
-    n->servo = servo;
-    n->thread = thread;
-    n->o = *options;
+    *n = (pal_bridge_net){.loop = loop, .servo = servo, .thread = thread, .o = *options};
     if (!n->o.servo.clock) n->o.servo.clock = &pal_clock_monotonic;
     n->count.tool = PAL_WIRE_TOOL_NONE;
     const bool bus = !strncmp(options->server, "lcm://", 6) || !strncmp(options->server, "udpm://", 7);

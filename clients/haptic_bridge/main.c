@@ -2,8 +2,8 @@
  * one), triple buffer between them. Ends with zero force. SIGUSR1 is the emergency stop, SIGUSR2 re-arms. */
 #include "clients/haptic_bridge/bridge_net.h"
 #include "clients/haptic_bridge/device_virtual.h"
-#include "clients/link/client_flags.h"
 #include "clients/link/end_condition.h"
+#include "server/base/flags.h"
 #include "server/base/json_members.h"
 #include "server/base/log.h"
 #include "server/base/vec3.h"
@@ -18,9 +18,10 @@
 #include <unistd.h>
 
 typedef struct bridge {
-    const char *device, *tool, *hand, *script, *origin, *up, *options;
+    const char *device, *tool, *hand, *script, *options;
     double seconds;
-    bool json, quiet, list, doctor, stdin_stop;
+    bool list, doctor, stdin_stop;
+    pal_flag_common common;
     pal_bridge_net_options net_options; /* the servo's among them */
     pal_servo *servo;
     pal_servo_thread *thread;
@@ -95,17 +96,15 @@ static pal_err main_workspace(bridge *b, pal_diagnostic *diag)
     pal_bridge_net_options *net = &b->net_options;
     pal_servo_options *o = &net->servo;
     double ex[3], ey[3];
-    if (!pal_client_parse_vector(b->up, net->up) || !pal_unit3(net->up, net->up, 1e-9))
-        return PAL_REFUSE(diag, "--up wants three numbers, not \"%s\"", b->up);
+    if (!pal_unit3(net->up, net->up, 1e-9)) return PAL_REFUSE(diag, "--up is no direction");
     const double other[3] = {fabs(net->up[0]) < 0.9, fabs(net->up[0]) >= 0.9, 0};
     pal_cross3(ey, net->up, other);
     pal_unit3(ey, ey, 1e-9);
     pal_cross3(ex, ey, net->up);
     for (int k = 0; k < 3; k++)
         o->rotation[3 * k] = ex[k], o->rotation[3 * k + 1] = ey[k], o->rotation[3 * k + 2] = net->up[k];
-    net->has_origin = b->origin != NULL;
-    if (b->origin && !pal_client_parse_vector(b->origin, o->origin_m))
-        return PAL_REFUSE(diag, "--origin wants three numbers, not \"%s\"", b->origin);
+    net->has_origin = !isnan(o->origin_m[0]);
+    if (!net->has_origin) pal_set3(o->origin_m, 0, 0, 0);
     return PAL_ERR_OK;
 }
 
@@ -122,7 +121,7 @@ static void main_json(const bridge *b, const pal_servo_timing *t, const pal_serv
     const char *forces = t->rt_flags & PAL_RT_OFF       ? "off: servo loop is late"
                          : t->rt_flags & PAL_RT_LIMITED ? "limited: servo loop is late"
                                                         : "full";
-    pal_client_print_json(PAL_JSON(
+    cJSON *report = PAL_JSON(
         {"ok", JSON_BOOL(reason == NULL)}, {"reason", reason ? JSON_TEXT(reason) : NULL},
         {"device", JSON_TEXT(b->net_options.servo.info.name)}, {"rate_hz", JSON_NUMBER(b->net_options.servo.rate_hz)},
         {"fifo", JSON_BOOL(t->rt_flags & PAL_RT_FIFO)}, {"memory_locked", JSON_BOOL(t->rt_flags & PAL_RT_LOCKED)},
@@ -136,7 +135,8 @@ static void main_json(const bridge *b, const pal_servo_timing *t, const pal_serv
         {"models_old", JSON_NUMBER(v->n_model_old)}, {"stale", JSON_NUMBER(v->n_stale)},
         {"faults", JSON_NUMBER(v->n_fault)}, {"not_finite", JSON_NUMBER(v->n_not_finite)},
         {"poses", JSON_NUMBER(c->n_pose)}, {"tool", JSON_NUMBER(c->tool)}, {"joined", JSON_BOOL(c->joined)},
-        {"position_m", cJSON_CreateDoubleArray(v->position_m, 3)}));
+        {"position_m", cJSON_CreateDoubleArray(v->position_m, 3)});
+    (void)pal_json_write(stdout, report);
 }
 
 static void main_table(const bridge *b, const pal_servo_timing *t, const pal_servo_view *v,
@@ -209,8 +209,8 @@ static int main_run(bridge *b)
                  counts.reason[0] ? counts.reason : "no answer");
         reason = lost;
     }
-    if (b->json) main_json(b, &timing, &view, &counts, reason);
-    if (!b->json && !b->quiet && !err) main_table(b, &timing, &view, &counts);
+    if (b->common.json) main_json(b, &timing, &view, &counts, reason);
+    if (!b->common.json && !b->common.quiet && !err) main_table(b, &timing, &view, &counts);
     if (reason) fprintf(stderr, "palpate-bridge: %s\n", reason);
     return reason ? 1 : 0;
 }
@@ -256,59 +256,56 @@ static int main_doctor(bridge *b)
 
 int main(int argc, char **argv)
 {
-    bridge b = {.device = "virtual:touch",
-                .tool = "any",
-                .hand = "average",
-                .script = "press-hold",
-                .up = "0,0,1",
-                .net_options = {.server = "ws://127.0.0.1:8090/ws",
-                                .session = "main",
-                                .name = "haptic bridge",
-                                .servo = {.rate_hz = 1000, .force_cap_N = 3, .scale = 1, .force_scale = 1}}};
+    bridge b = {
+        .device = "virtual:touch",
+        .tool = "any",
+        .hand = "average",
+        .script = "press-hold",
+        .net_options = {.server = "ws://127.0.0.1:8090/ws",
+                        .session = "main",
+                        .name = "haptic bridge",
+                        .up = {0, 0, 1},
+                        .servo = {.rate_hz = 1000, .force_cap_N = 3, .scale = 1, .force_scale = 1, .origin_m = {NAN}}}};
     pal_bridge_net_options *net = &b.net_options;
     pal_servo_options *servo = &net->servo;
-    const pal_client_flag flag[] = {
-        {"--device", "BACKEND:ID", &b.device, 0, 0, NULL,
+    const pal_flag flag[] = {
+        {"--device", "BACKEND:ID", PAL_FLAG_TEXT, &b.device, 0, 0,
          "virtual:touch | premium | omega3 | inverse3 | falcon (virtual:touch)"},
-        {"--server", "URL", &net->server, 0, 0, NULL, "ws://host:port/ws or lcm://group:port?ttl=0"},
-        {"--session", "NAME", &net->session, 0, 0, NULL, "LCM: name in the channels (main)"},
-        {"--name", "NAME", &net->name, 0, 0, NULL, "name among the members"},
-        {"--tool", "N", &b.tool, 0, 0, NULL, "tool to take: index or any; LCM: index (any, 0)"},
-        {"--hand", "NAME", &b.hand, 0, 0, NULL, "virtual: average | light | firm | off"},
-        {"--script", "NAME", &b.script, 0, 0, NULL, "virtual: still | press-hold | cycle | ramp | stroke | tap"},
-        {"--options", "K=V,...", &b.options, 0, 0, NULL, "virtual: depth, height mm, wait s, lag ms, clock"},
-        {"--rate", "HZ", &servo->rate_hz, 500, 4000, NULL, "servo rate (1000)"},
-        {"--seconds", "S", &b.seconds, 0.1, 86400, NULL, "end after this time (never)"},
-        {"--until", "NAME=N,...", &b.until_text, 0, 0, NULL,
+        {"--server", "URL", PAL_FLAG_TEXT, &net->server, 0, 0, "ws://host:port/ws or lcm://group:port?ttl=0"},
+        {"--session", "NAME", PAL_FLAG_TEXT, &net->session, 0, 0, "LCM: name in the channels (main)"},
+        {"--name", "NAME", PAL_FLAG_TEXT, &net->name, 0, 0, "name among the members"},
+        {"--tool", "N", PAL_FLAG_TEXT, &b.tool, 0, 0, "tool to take: index or any; LCM: index (any, 0)"},
+        {"--hand", "NAME", PAL_FLAG_TEXT, &b.hand, 0, 0, "virtual: average | light | firm | off"},
+        {"--script", "NAME", PAL_FLAG_TEXT, &b.script, 0, 0,
+         "virtual: still | press-hold | cycle | ramp | stroke | tap"},
+        {"--options", "K=V,...", PAL_FLAG_TEXT, &b.options, 0, 0, "virtual: depth, height mm, wait s, lag ms, clock"},
+        {"--rate", "HZ", PAL_FLAG_NUMBER, &servo->rate_hz, 500, 4000, "servo rate (1000)"},
+        {"--seconds", "S", PAL_FLAG_NUMBER, &b.seconds, 0.1, 86400, "end after this time (never)"},
+        {"--until", "NAME=N,...", PAL_FLAG_TEXT, &b.until_text, 0, 0,
          "end before that once all is reached: models, poses, force_N, stale, free=1"},
-        {"--force-cap", "N", &servo->force_cap_N, 0, 20, NULL, "largest force (3, and the device's peak)"},
-        {"--origin", "X,Y,Z", &b.origin, 0, 0, NULL, "world place of the workspace's centre, m"},
-        {"--up", "X,Y,Z", &b.up, 0, 0, NULL, "world direction of the device's up (0,0,1)"},
-        {"--scale", "S", &servo->scale, 0.01, 100, NULL, "world metres per device metre (1)"},
-        {"--force-scale", "S", &servo->force_scale, 0.01, 100, NULL, "device newtons per world newton (1)"},
-        {"--pose-only", NULL, &servo->pose_only, 0, 0, NULL, "no force"},
-        {"--stdin-stop", NULL, &b.stdin_stop, 0, 0, NULL, "closed standard input is an emergency stop"},
-        {"--list-devices", NULL, &b.list, 0, 0, NULL, "which back ends there are, or why not"},
-        {"--doctor", NULL, &b.doctor, 0, 0, NULL, "check limits, device and one second of servo"},
-        {"--json", NULL, &b.json, 0, 0, NULL, "one JSON object on stdout at the end"},
-        {"--quiet", NULL, &b.quiet, 0, 0, NULL, "say nothing unless something fails"},
+        {"--force-cap", "N", PAL_FLAG_NUMBER, &servo->force_cap_N, 0, 20, "largest force (3, and the device's peak)"},
+        {"--origin", "X,Y,Z", PAL_FLAG_VECTOR, servo->origin_m, 0, 0, "world place of the workspace's centre, m"},
+        {"--up", "X,Y,Z", PAL_FLAG_VECTOR, net->up, 0, 0, "world direction of the device's up (0,0,1)"},
+        {"--scale", "S", PAL_FLAG_NUMBER, &servo->scale, 0.01, 100, "world metres per device metre (1)"},
+        {"--force-scale", "S", PAL_FLAG_NUMBER, &servo->force_scale, 0.01, 100, "device newtons per world newton (1)"},
+        {"--pose-only", NULL, PAL_FLAG_SWITCH, &servo->pose_only, 0, 0, "no force"},
+        {"--stdin-stop", NULL, PAL_FLAG_SWITCH, &b.stdin_stop, 0, 0, "closed standard input is an emergency stop"},
+        {"--list-devices", NULL, PAL_FLAG_SWITCH, &b.list, 0, 0, "which back ends there are, or why not"},
+        {"--doctor", NULL, PAL_FLAG_SWITCH, &b.doctor, 0, 0, "check limits, device and one second of servo"},
     };
-    const pal_client_table table = {.program = "palpate-bridge",
-                                    .usage = "[flags]",
-                                    .about = "Renders a session's contact models on a haptic device at 1 kHz. SIGUSR1 "
-                                             "is the emergency stop, SIGUSR2 re-arms.",
-                                    .flag = flag,
-                                    .n_flag = sizeof flag / sizeof flag[0]};
-    const int code = pal_client_flags_parse(&table, argc, argv, NULL);
+    const pal_flag_table table = {.program = "palpate-bridge",
+                                  .usage = "[flags]",
+                                  .about = "Renders a session's contact models on a haptic device at 1 kHz. SIGUSR1 "
+                                           "is the emergency stop, SIGUSR2 re-arms.\n",
+                                  PAL_FLAGS(flag)};
+    const int code = pal_flags_parse(&table, argc, argv, &b.common, NULL, NULL);
     if (code >= 0) return code;
     if (b.list) return main_list();
     pal_diagnostic diag = {""};
     if (b.until_text &&
-        pal_end_condition_parse(&b.until, until_name, sizeof until_name / sizeof *until_name, b.until_text, &diag)) {
-        fprintf(stderr, "palpate-bridge: %s\n", diag.text);
-        return 2;
-    }
-    pal_log_set_level(b.quiet || b.json ? PAL_LOG_ERROR : PAL_LOG_INFO);
+        pal_end_condition_parse(&b.until, until_name, sizeof until_name / sizeof *until_name, b.until_text, &diag))
+        return pal_flags_wrong(&b.common, "%s", diag.text);
+    pal_log_set_level(b.common.quiet || b.common.json ? PAL_LOG_ERROR : PAL_LOG_INFO);
     if (b.doctor) return main_doctor(&b);
     signal(SIGUSR1, main_on_signal);
     signal(SIGUSR2, main_on_signal);

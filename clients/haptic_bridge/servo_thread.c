@@ -144,7 +144,6 @@ static pal_err thread_make(pthread_t *thread, void *(*run)(void *), void *user, 
     return failed ? PAL_ERR_MEMORY : PAL_ERR_OK;
 }
 
-/* ends the threads that run */
 static void thread_join(pal_servo_thread *t)
 {
     atomic_store(&t->stop, true);

@@ -24,10 +24,8 @@ pal_asset_store *pal_asset_store_create(pal_link_loop *loop, const char *url,
 {
     pal_asset_store *store = calloc(1, sizeof *store);
     if (!store) return NULL;
-    store->loop = loop;
+    *store = (pal_asset_store){.loop = loop, .changed = changed, .user = user};
     strncpy(store->url, url, sizeof store->url - 1);
-    store->changed = changed;
-    store->user = user;
     return store;
 }
 
@@ -88,9 +86,8 @@ pal_stored_asset *pal_asset_store_request(pal_asset_store *store, const char *pa
     if (!entry) {
         entry = calloc(1, sizeof *entry);
         if (!entry) return NULL;
+        *entry = (store_entry){.next = store->entries, .store = store};
         strncpy(entry->shown.path, path, sizeof entry->shown.path - 1);
-        entry->store = store;
-        entry->next = store->entries;
         store->entries = entry;
     }
     if (!entry->shown.ready && !entry->asked) {

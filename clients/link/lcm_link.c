@@ -144,9 +144,7 @@ pal_err pal_lcm_link_open(pal_link_loop *loop, const char *url, const pal_lcm_ev
 {
     pal_lcm_link *link = calloc(1, sizeof *link);
     if (!link) return PAL_ERR_MEMORY;
-    link->buffer = malloc(PAL_LCM_DATAGRAM_MAX + 512);
-    link->events = events;
-    link->user = user;
+    *link = (pal_lcm_link){.buffer = malloc(PAL_LCM_DATAGRAM_MAX + 512), .events = events, .user = user};
     pal_err err = link->buffer ? lcm_url(link->url, url, &link->memory, diag) : PAL_ERR_MEMORY;
     /* a memory queue belongs to its caller's own loop of calls */
     link->loop = link->memory ? NULL : loop;

@@ -89,11 +89,7 @@ pal_err pal_link_get(pal_link_loop *loop, const char *url, const char *path, siz
     PAL_TRY(link_address_parse(url, &address, diag));
     link_get *get = calloc(1, sizeof *get);
     if (!get) return PAL_ERR_MEMORY;
-    get->loop = loop;
-    get->done = done;
-    get->user = user;
-    get->max = max;
-    get->next = loop->gets;
+    *get = (link_get){.next = loop->gets, .loop = loop, .done = done, .user = user, .max = max};
     loop->gets = get;
     struct lws_client_connect_info info = link_connect_info(loop, &address, LINK_LOCAL_GET, get, &get->wsi);
     info.origin = address.host;

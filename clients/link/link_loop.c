@@ -145,11 +145,8 @@ pal_link_timer *pal_link_add_timer(pal_link_loop *loop, uint64_t period_us, void
 {
     pal_link_timer *timer = calloc(1, sizeof *timer);
     if (!timer) return NULL;
-    timer->loop = loop;
+    *timer = (pal_link_timer){.next = loop->timers, .loop = loop, .fn = fn, .user = user};
     timer->period_us = period_us > 0 ? period_us : 1;
-    timer->fn = fn;
-    timer->user = user;
-    timer->next = loop->timers;
     loop->timers = timer;
     lws_sul_schedule(loop->context, 0, &timer->sul, link_timer_fired, (lws_usec_t)timer->period_us);
     return timer;
@@ -169,8 +166,7 @@ pal_err pal_link_poll_fd(pal_link_loop *loop, int fd, void (*fn)(void *user), vo
 {
     link_watch *watch = calloc(1, sizeof *watch);
     if (!watch) return PAL_ERR_MEMORY;
-    watch->fn = fn;
-    watch->user = user;
+    *watch = (link_watch){.next = loop->watches, .fn = fn, .user = user};
     lws_sock_file_fd_type copy = {.filefd = dup(fd)};
     struct lws *wsi = copy.filefd < 0 ? NULL
                                       : lws_adopt_descriptor_vhost(loop->vhost, LWS_ADOPT_RAW_FILE_DESC, copy,
@@ -180,7 +176,6 @@ pal_err pal_link_poll_fd(pal_link_loop *loop, int fd, void (*fn)(void *user), vo
         return PAL_ERR_IO;
     }
     lws_set_opaque_user_data(wsi, watch);
-    watch->next = loop->watches;
     loop->watches = watch;
     return PAL_ERR_OK;
 }

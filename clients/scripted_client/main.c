@@ -1,8 +1,8 @@
 /* palpate-client: scripted headless trainees against a server; load, latency, frame checks (scripted_client.h). */
-#include "clients/link/client_flags.h"
 #include "clients/link/end_condition.h"
 #include "clients/scripted_client/scripted_client.h"
 #include "protocol/field_codec.h"
+#include "server/base/flags.h"
 #include "server/base/json_members.h"
 #include "server/base/log.h"
 #include "server/base/vec3.h"
@@ -111,7 +111,7 @@ static void main_reported(void *user, const pal_order_result *reported)
                         {"epoch", JSON_NUMBER(r->epoch)}, {"vertices", JSON_NUMBER(r->n_vertex)});
     for (uint32_t i = 0; r->answer && i < r->answer->n_arg; i++)
         cJSON_AddNumberToObject(o, r->answer->arg[i].key, r->answer->arg[i].value);
-    pal_client_print_json(o);
+    (void)pal_json_write(stdout, o);
 }
 
 /* fields a second that one client got */
@@ -136,7 +136,7 @@ static void main_json(totals *sum, int n_client, bool ok, const char *reason)
                           {"triangles", JSON_NUMBER(sum->triangles)}, {"slots", JSON_NUMBER(sum->slots)});
     for (int i = 0; i < PAL_FAULT_COUNT; i++)
         cJSON_AddNumberToObject(faults, pal_fault_name((pal_fault)i), (double)sum->fault[i]);
-    pal_client_print_json(PAL_JSON(
+    cJSON *report = PAL_JSON(
         {"ok", JSON_BOOL(ok)}, {"reason", ok ? NULL : JSON_TEXT(reason)}, {"clients", JSON_NUMBER(n_client)},
         {"joined", JSON_NUMBER(sum->joined)}, {"with_tool", JSON_NUMBER(sum->with_tool)},
         {"seconds", JSON_NUMBER(sum->seconds)}, {"frames", JSON_NUMBER(sum->frames)},
@@ -151,7 +151,8 @@ static void main_json(totals *sum, int n_client, bool ok, const char *reason)
         {"orders", sum->n_order ? JSON_NUMBER(sum->n_order) : NULL},
         {"orders_refused", sum->n_order ? JSON_NUMBER(sum->n_refused) : NULL},
         {"old_cycles_after_stall", sum->stalls_done ? JSON_NUMBER(sum->old_after_stall) : NULL},
-        {"closed", sum->closed ? JSON_TEXT(sum->closed) : NULL}, {"faults", faults}));
+        {"closed", sum->closed ? JSON_TEXT(sum->closed) : NULL}, {"faults", faults});
+    (void)pal_json_write(stdout, report);
 }
 
 static void main_table(totals *sum, int n_client)
@@ -204,7 +205,7 @@ static const char *main_verdict(const totals *sum, int n_client, const char *fie
     return reason;
 }
 
-static int main_run(crowd *c, const pal_scripted_client_options *base, double seconds, bool json, bool quiet)
+static int main_run(crowd *c, const pal_scripted_client_options *base, double seconds, const pal_flag_common *common)
 {
     pal_diagnostic diag = {""};
     pal_log_set_level(PAL_LOG_WARN);
@@ -231,8 +232,8 @@ static int main_run(crowd *c, const pal_scripted_client_options *base, double se
     pal_link_loop_destroy(c->loop);
     const char *reason =
         err ? (diag.text[0] ? diag.text : pal_err_text(err)) : main_verdict(&sum, wanted, base->field, base->orders);
-    if (json) main_json(&sum, wanted, !reason, reason);
-    if (!json && !quiet && !err) main_table(&sum, wanted);
+    if (common->json) main_json(&sum, wanted, !reason, reason);
+    if (!common->json && !common->quiet && !err) main_table(&sum, wanted);
     if (reason) fprintf(stderr, "palpate-client: %s\n", reason);
     pal_samples_free(&sum.latency);
     pal_samples_free(&sum.decode);
@@ -240,85 +241,78 @@ static int main_run(crowd *c, const pal_scripted_client_options *base, double se
     return reason ? 1 : 0;
 }
 
-/* orders and what to wait for, where they are given; an exit code */
-static int main_read(const char *sculpt, pal_orders *orders, const char *until, pal_end_condition *seen)
+/* orders and what to wait for, where they are given; an exit code, 0: continue */
+static int main_read(const pal_flag_common *common, const char *sculpt, pal_orders *orders, const char *until,
+                     pal_end_condition *seen)
 {
     pal_diagnostic diag = {""};
-    if (until && !*until) {
-        fputs("palpate-client: --until \"\" waits for nothing: NAME=N,... is wanted\n", stderr);
-        return 2;
-    }
-    const int code = until && pal_end_condition_parse(seen, pal_client_seen_name, PAL_CLIENT_SEEN_COUNT, until, &diag)
-                         ? 2
-                         : sculpt && pal_orders_load(orders, sculpt, &diag);
-    if (code) fprintf(stderr, "palpate-client: %s\n", diag.text);
-    return code;
+    if (until && !*until) return pal_flags_wrong(common, "--until \"\" waits for nothing: NAME=N,... is wanted");
+    if (until && pal_end_condition_parse(seen, pal_client_seen_name, PAL_CLIENT_SEEN_COUNT, until, &diag))
+        return pal_flags_wrong(common, "%s", diag.text);
+    if (!sculpt || !pal_orders_load(orders, sculpt, &diag)) return 0;
+    fprintf(stderr, "palpate-client: %s\n", diag.text);
+    return 1;
 }
 
 int main(int argc, char **argv)
 {
-    const char *tool = "any", *up = "0,0,1", *stall = NULL, *sculpt = NULL, *until = NULL;
-    double seconds = 5, clients = 1;
-    bool json = false, quiet = false;
-    pal_scripted_client_options base = {
-        .name = "trainee", .script = "press", .tool = PAL_WIRE_TOOL_ANY, .rate_hz = 120};
-    const pal_client_flag flag[] = {
-        {"--script", "NAME", &base.script, 0, 0, NULL, "press | pull | circle | idle | FILE (press)"},
-        {"--name", "NAME", &base.name, 0, 0, NULL, "name among the members"},
-        {"--tool", "N", &tool, 0, 0, NULL, "tool to take: its index or any (any)"},
-        {"--seconds", "S", &seconds, 0.1, 86400, NULL, "how long (5)"},
-        {"--until", "NAME=N,...", &until, 0, 0, NULL,
+    const char *tool = "any", *stall = NULL, *sculpt = NULL, *until = NULL;
+    double seconds = 5;
+    pal_flag_common common;
+    pal_scripted_client_options base = {.name = "trainee",
+                                        .script = "press",
+                                        .tool = PAL_WIRE_TOOL_ANY,
+                                        .rate_hz = 120,
+                                        .n_client = 1,
+                                        .up = {0, 0, 1}};
+    const pal_flag flag[] = {
+        {"--script", "NAME", PAL_FLAG_TEXT, &base.script, 0, 0, "press | pull | circle | idle | FILE (press)"},
+        {"--name", "NAME", PAL_FLAG_TEXT, &base.name, 0, 0, "name among the members"},
+        {"--tool", "N", PAL_FLAG_TEXT, &tool, 0, 0, "tool to take: its index or any (any)"},
+        {"--seconds", "S", PAL_FLAG_NUMBER, &seconds, 0.1, 86400, "how long (5)"},
+        {"--until", "NAME=N,...", PAL_FLAG_TEXT, &until, 0, 0,
          "end before that once each client has seen so much:\n"
          "cycles, frames, answered, fields, deltas, triangles, orders, topologies,\n"
          "cycles_of_it (the last topology's), members, joins, stalls, cycles_after_stall,\n"
          "moved_mm, force_N, field_high"},
-        {"--rate", "HZ", &base.rate_hz, 1, 240, NULL, "poses per second (120)"},
-        {"--clients", "N", &clients, 1, CLIENTS_MAX, NULL, "so many at once (1)"},
-        {"--depth", "M", &base.depth_m, 1e-5, 1, NULL, "depth of a press in metres (8 % of the box)"},
-        {"--up", "X,Y,Z", &up, 0, 0, NULL, "from which side the organ is touched (0,0,1)"},
-        {"--field", "NAME", &base.field, 0, 0, NULL,
+        {"--rate", "HZ", PAL_FLAG_NUMBER, &base.rate_hz, 1, 240, "poses per second (120)"},
+        {"--clients", "N", PAL_FLAG_COUNT, &base.n_client, 1, CLIENTS_MAX, "so many at once (1)"},
+        {"--depth", "M", PAL_FLAG_NUMBER, &base.depth_m, 1e-5, 1, "depth of a press in metres (8 % of the box)"},
+        {"--up", "X,Y,Z", PAL_FLAG_VECTOR, base.up, 0, 0, "from which side the organ is touched (0,0,1)"},
+        {"--field", "NAME", PAL_FLAG_TEXT, &base.field, 0, 0,
          "ask for displacement | von_mises | energy | stiffness | strain | distortion, check it"},
-        {"--sculpt", "FILE", &sculpt, 0, 0, NULL, "give these orders: lines of SECONDS VERB key=value ... [at=top]"},
-        {"--slow", "BYTES_S", &base.read_bytes_s, 1, 1e9, NULL, "read no faster than this"},
-        {"--stall", "S", &stall, 0, 0, "3", "read nothing for S seconds (3), then go on"},
-        {"--json", NULL, &json, 0, 0, NULL, "one JSON object on stdout"},
-        {"--quiet", NULL, &quiet, 0, 0, NULL, "say nothing unless something fails"},
+        {"--sculpt", "FILE", PAL_FLAG_TEXT, &sculpt, 0, 0,
+         "give these orders: lines of SECONDS VERB key=value ... [at=top]"},
+        {"--slow", "BYTES_S", PAL_FLAG_NUMBER, &base.read_bytes_s, 1, 1e9, "read no faster than this"},
+        {"--stall", "S", PAL_FLAG_OPTIONAL, &stall, 0, 0, "read nothing for S seconds (3), then go on"},
     };
-    const pal_client_table table = {
-        "palpate-client",
-        "URL [flags]",
-        "Joins the session at ws://host:port/ws, moves a tool by a script, checks every frame and measures the time\n"
-        "from pose to frame. Exit code 1 when a check failed.",
-        flag,
-        sizeof flag / sizeof flag[0],
-        1,
-        1};
-    const int code = pal_client_flags_parse(&table, argc, argv, &base.url);
+    const pal_flag_table table = {.program = "palpate-client",
+                                  .usage = "URL [flags]",
+                                  .about = "Joins the session at ws://host:port/ws, moves a tool by a script, checks "
+                                           "every frame and measures the time\n"
+                                           "from pose to frame. Exit code 1 when a check failed.\n",
+                                  PAL_FLAGS(flag),
+                                  .operands = {1, 1}};
+    const int code = pal_flags_parse(&table, argc, argv, &common, &base.url, NULL);
     if (code >= 0) return code;
-    base.n_client = (int)clients;
-    base.stall_s = stall ? atof(stall) : 0;
+    if (stall) base.stall_s = *stall ? atof(stall) : 3;
     if (strcmp(tool, "any")) base.tool = atoi(tool);
-    if (!pal_client_parse_vector(up, base.up) || !pal_unit3(base.up, base.up, 1e-9) || base.tool >= PAL_WIRE_TOOL_MAX) {
-        fprintf(stderr, "palpate-client: --up wants three numbers, --tool an index or any\n");
-        return 2;
-    }
-    if (base.field && (pal_wire_field_find(base.field) == PAL_WIRE_FIELD_COUNT || !strcmp(base.field, "none"))) {
-        fprintf(stderr,
-                "palpate-client: --field wants displacement, von_mises, energy, stiffness, strain or distortion, not "
-                "\"%s\"\n",
-                base.field);
-        return 2;
-    }
+    if (!pal_unit3(base.up, base.up, 1e-9) || base.tool >= PAL_WIRE_TOOL_MAX)
+        return pal_flags_wrong(&common, "--up wants a direction, --tool an index or any");
+    if (base.field && (pal_wire_field_find(base.field) == PAL_WIRE_FIELD_COUNT || !strcmp(base.field, "none")))
+        return pal_flags_wrong(
+            &common, "--field wants displacement, von_mises, energy, stiffness, strain or distortion, not \"%s\"",
+            base.field);
     pal_orders orders = {.n_line = 0};
     pal_end_condition seen = {.any = false};
-    const int bad = main_read(sculpt, &orders, until, &seen);
+    const int bad = main_read(&common, sculpt, &orders, until, &seen);
     if (bad) return bad;
     if (sculpt) base.orders = &orders;
-    if (!quiet) base.reported = main_reported, base.user = &json;
+    if (!common.quiet) base.reported = main_reported, base.user = &common.json;
     crowd c = {.trainee = calloc((size_t)base.n_client, sizeof *c.trainee),
                .name = calloc((size_t)base.n_client, sizeof *c.name),
                .until = seen};
-    const int result = c.trainee && c.name ? main_run(&c, &base, seconds, json, quiet) : 1;
+    const int result = c.trainee && c.name ? main_run(&c, &base, seconds, &common) : 1;
     for (int i = 0; i < c.n; i++) pal_scripted_client_destroy(c.trainee[i]);
     pal_asset_store_destroy(c.store);
     free(c.trainee), free(c.name);

@@ -551,9 +551,7 @@ pal_err pal_scripted_client_open(pal_link_loop *loop, pal_asset_store *store,
     static const pal_link_events events = {client_on_state, client_on_control, client_on_message, client_on_fault};
     pal_scripted_client *t = calloc(1, sizeof *t);
     if (!t) return PAL_ERR_MEMORY;
-    t->store = store;
-    t->options = *options;
-    t->result.tool = PAL_WIRE_TOOL_NONE;
+    *t = (pal_scripted_client){.store = store, .options = *options, .result.tool = PAL_WIRE_TOOL_NONE};
     /* a frame around up; the script is read once here so that a bad file is refused at the start */
     const double *up = options->up;
     const double other[3] = {fabs(up[0]) < 0.9, fabs(up[0]) >= 0.9, 0};

@@ -4,7 +4,9 @@
 #ifndef PAL_BASE_JSON_MEMBERS_H
 #define PAL_BASE_JSON_MEMBERS_H
 #include <cjson/cJSON.h>
+#include <stdbool.h>
 #include <stddef.h>
+#include <stdio.h>
 
 typedef struct pal_json_member {
     const char *key;
@@ -17,6 +19,16 @@ static inline cJSON *pal_json_add_members(cJSON *object, const pal_json_member *
     for (; member->key; member++)
         if (member->value) cJSON_AddItemToObject(object, member->key, member->value);
     return object;
+}
+
+/* writes the object to a file as one line, and takes it; false: it could not be made or written */
+static inline bool pal_json_write(FILE *to, cJSON *object)
+{
+    char *text = object ? cJSON_PrintUnformatted(object) : NULL;
+    bool good = text && fprintf(to, "%s\n", text) >= 0 && fflush(to) == 0;
+    cJSON_free(text);
+    cJSON_Delete(object);
+    return good;
 }
 
 #define PAL_JSON_ADD(object, ...) pal_json_add_members(object, (const pal_json_member[]){__VA_ARGS__, {NULL, NULL}})

@@ -105,6 +105,15 @@ static inline void pal_tmul33(double r[3], const double m[9], const double a[3])
            z = m[2] * a[0] + m[5] * a[1] + m[8] * a[2];
     r[0] = x, r[1] = y, r[2] = z;
 }
+/* r = m^-1, not in place; returns the determinant. r has numbers that are not finite where m has no inverse */
+static inline double pal_inverse33(double r[9], const double m[9])
+{
+    double column[3][3];
+    for (int k = 0; k < 3; k++) pal_cross3(column[k], m + 3 * ((k + 1) % 3), m + 3 * ((k + 2) % 3));
+    const double det = pal_dot3(m, column[0]);
+    for (int k = 0; k < 9; k++) r[k] = column[k % 3][k / 3] / det;
+    return det;
+}
 static inline void pal_quat_rotate(double r[3], const double q[4], const double a[3]) /* q unit */
 {
     double t[3], u[3] = {q[1], q[2], q[3]};

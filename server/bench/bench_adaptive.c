@@ -46,7 +46,6 @@ typedef struct pressed {
     double at[3];
 } pressed;
 
-/* what a run of one kind shows */
 typedef struct run {
     int n_node[2], n_spring[2];         /* least and most active */
     int n_sub;                          /* sub-steps             */
@@ -178,7 +177,7 @@ static const char *range_text(const int n[2], char text[32])
     return text;
 }
 
-static void report_table(bench_report *r, const pressed *p, const run all[KINDS], const double run_s[KINDS],
+static void report_table(pal_table *r, const pressed *p, const run all[KINDS], const double run_s[KINDS],
                          const double paper_s[KINDS])
 {
     const run *refined = &all[REFINED];
@@ -190,7 +189,7 @@ static void report_table(bench_report *r, const pressed *p, const run all[KINDS]
         double off = 0;
         for (int i = 0; i < a->n_sample; i++)
             off = fmax(off, fabs(a->displacement_m[i] - refined->displacement_m[i]) / max);
-        BENCH_ROW(r, TEXT("body", "body", -8, p->name), TEXT("run", "run", -9, kind_name[kind]),
+        TABLE_ROW(r, TEXT("body", "body", -8, p->name), TEXT("run", "run", -9, kind_name[kind]),
                   TEXT("surface", "surface", -17, p->source), TEXT("nodes", "nodes", 9, range_text(a->n_node, nodes)),
                   TEXT("springs", "springs", 11, range_text(a->n_spring, springs)),
                   NUMBER("moved_m", "moved m", 9, 5, a->moved_m), NUMBER("off", "off", 7, 4, off),
@@ -202,7 +201,7 @@ static void report_table(bench_report *r, const pressed *p, const run all[KINDS]
     }
 }
 
-static pal_err run_table(const pressed *p, const double paper_s[KINDS], run out[KINDS], bench_report *r,
+static pal_err run_table(const pressed *p, const double paper_s[KINDS], run out[KINDS], pal_table *r,
                          pal_diagnostic *diag)
 {
     pal_world *world[KINDS] = {NULL};
@@ -232,7 +231,7 @@ static pal_err run_table(const pressed *p, const double paper_s[KINDS], run out[
 
 /* our own surface of each shape into drawn, then the shared one where it exists. The sphere is pressed at its equator,
  * where every vertex is regular */
-static pal_err run_tables(run drawn[2][KINDS], bench_report *r, pal_diagnostic *diag)
+static pal_err run_tables(run drawn[2][KINDS], pal_table *r, pal_diagnostic *diag)
 {
     static const double paper_s[2][KINDS] = {{2.334, 10.078, 3.136}, {3.328, 14.422, 6.906}};
     static const char *const file[2] = {"sphere_114.obj", "stomach_188.obj"};
@@ -310,7 +309,7 @@ static pal_err make_ball(int n_split, double radius_m, double force_N, pressed *
     return PAL_ERR_OK;
 }
 
-static pal_err run_palm(const pressed *p, bench_report *r, pal_diagnostic *diag)
+static pal_err run_palm(const pressed *p, pal_table *r, pal_diagnostic *diag)
 {
     pal_world *world[2] = {NULL};
     double run_s[2][PALM_ROUNDS], ratio[PALM_ROUNDS];
@@ -330,7 +329,7 @@ static pal_err run_palm(const pressed *p, bench_report *r, pal_diagnostic *diag)
     for (int k = 0; k < 2; k++) {
         const pal_adaptive_surface *adaptive = err ? NULL : pal_world_body(world[k], 0)->model.adaptive;
         if (!err)
-            BENCH_ROW(r, TEXT("run", "run", -9, kind_name[REFINED + k]),
+            TABLE_ROW(r, TEXT("run", "run", -9, kind_name[REFINED + k]),
                       NUMBER("nodes", "nodes", 7, 0, adaptive->n_node),
                       NUMBER("springs", "springs", 7, 0, adaptive->n_spring),
                       NUMBER("second_s", "s", 8, 3, pal_median(run_s[k], PALM_ROUNDS)),
@@ -391,7 +390,7 @@ static pal_err run_switches(pal_world *world, double us[3], pal_diagnostic *diag
     return PAL_ERR_OK;
 }
 
-static pal_err measure_live(pal_world *world, const pressed *p, bench_report *r, pal_diagnostic *diag)
+static pal_err measure_live(pal_world *world, const pressed *p, pal_table *r, pal_diagnostic *diag)
 {
     static double step_ms[LIVE_STEPS], component_ms[COMPONENTS][LIVE_STEPS];
     const pal_body *body = pal_world_body(world, 0);
@@ -412,38 +411,38 @@ static pal_err measure_live(pal_world *world, const pressed *p, bench_report *r,
     int n_node = body->n_active, n_spring = body->model.adaptive->n_spring, n_sub = pal_world_substeps(world);
     double p50_ms = pal_median(step_ms, LIVE_STEPS), p95_ms = step_ms[LIVE_STEPS * 95 / 100];
     PAL_TRY(run_switches(world, us, diag));
-    bench_note(r, "\nfinest level of %d nodes, steps of 1 ms; wanted: less than 1 ms", body->n_node);
-    bench_list(r, "live");
-    BENCH_ROW(r, VALUE("finest_nodes", body->n_node), NUMBER("nodes", "nodes", 7, 0, n_node),
+    pal_table_note(r, "\nfinest level of %d nodes, steps of 1 ms; wanted: less than 1 ms", body->n_node);
+    pal_table_list(r, "live");
+    TABLE_ROW(r, VALUE("finest_nodes", body->n_node), NUMBER("nodes", "nodes", 7, 0, n_node),
               NUMBER("springs", "springs", 7, 0, n_spring), NUMBER("substeps", "sub-steps", 9, 0, n_sub),
               NUMBER("p50_ms", "ms p50", 7, 3, p50_ms), NUMBER("p95_ms", "ms p95", 7, 3, p95_ms),
               NUMBER("split_us", "split us", 9, 1, us[0]), NUMBER("join_us", "join us", 9, 1, us[1]),
               NUMBER("after_us", "next step us", 12, 1, us[2]));
-    bench_list(r, "components");
+    pal_table_list(r, "components");
     for (int k = 0; k < n_component; k++) {
         pal_world_component_info(world, k, &info);
-        BENCH_ROW(r, TEXT("name", "component", -16, info.name),
+        TABLE_ROW(r, TEXT("name", "component", -16, info.name),
                   NUMBER("ms", "ms", 7, 4, pal_median(component_ms[k], LIVE_STEPS)));
     }
     return PAL_ERR_OK;
 }
 
-pal_err bench_adaptive(bench_report *r, pal_diagnostic *diag)
+pal_err bench_adaptive(pal_table *r, pal_diagnostic *diag)
 {
     static run drawn[2][KINDS];
     pressed ball[2] = {{.name = NULL}};
     pal_world *world = NULL;
-    BENCH_ROW(r, VALUE("rounds", ROUNDS), VALUE("simulated_s", press_s + free_s));
-    bench_note(r,
-               "paper C, Table I, %.1f simulated seconds: pressed for %.0f s, then free; medians of %d, one core\n"
-               "wanted: adaptive at most 0.30 of refined; stomach 500 times as fast refined, 1000 times adaptive",
-               press_s + free_s, press_s, ROUNDS);
-    bench_list(r, "table");
+    TABLE_ROW(r, VALUE("rounds", ROUNDS), VALUE("simulated_s", press_s + free_s));
+    pal_table_note(r,
+                   "paper C, Table I, %.1f simulated seconds: pressed for %.0f s, then free; medians of %d, one core\n"
+                   "wanted: adaptive at most 0.30 of refined; stomach 500 times as fast refined, 1000 times adaptive",
+                   press_s + free_s, press_s, ROUNDS);
+    pal_table_list(r, "table");
     PAL_TRY(run_tables(drawn, r, diag));
     if (r->argument) PAL_TRY(draw_trajectories(drawn, r->argument, diag));
-    bench_note(
+    pal_table_note(
         r, "\nfour levels, a palm refined, processor seconds of a simulated second; wanted: at most 0.08 of refined");
-    bench_list(r, "palm");
+    pal_table_list(r, "palm");
     pal_err err = make_ball(1, 0.035, 0.12, &ball[0], diag);
     if (!err) err = run_palm(&ball[0], r, diag);
     if (!err) err = make_ball(2, 0.016, 0.3, &ball[1], diag);

@@ -109,11 +109,11 @@ static pal_err run_job(const job *j, const char *folder, double target_percent, 
     return err;
 }
 
-static void add_job(bench_report *r, const job *j, const result *c)
+static void add_job(pal_table *r, const job *j, const result *c)
 {
     char grid[40] = "one";
     if (j->grid[0] > 0) snprintf(grid, sizeof grid, "%dx%dx%d", j->grid[0], j->grid[1], j->grid[2]);
-    BENCH_ROW(
+    TABLE_ROW(
         r, TEXT("body", "body", -5, j->name), TEXT("fitted", "fitted", -16, j->fit),
         TEXT("grid", "constants", -9, grid), NUMBER("parameters", "", 6, 0, c->info.n_parameter),
         TEXT("method", "method", -9, j->annealing ? "annealing" : "adjoint"),
@@ -126,14 +126,14 @@ static void add_job(bench_report *r, const job *j, const result *c)
         NUMBER("search_s", "search s", 9, 2, c->search_s));
 }
 
-pal_err bench_calibrate(bench_report *r, pal_diagnostic *diag)
+pal_err bench_calibrate(pal_table *r, pal_diagnostic *diag)
 {
     static const char *const key[N_JOB / 2] = {"annealing_over_adjoint", "gear_grid_over_one", "cube_grid_over_one",
                                                "bar_grid_over_one"};
     result all[N_JOB];
     double ratio[N_JOB / 2];
-    bench_note(r, "springs calibrated on finite elements, RMS in %% of the largest displacement, one thread");
-    bench_list(r, "cases");
+    pal_table_note(r, "springs calibrated on finite elements, RMS in %% of the largest displacement, one thread");
+    pal_table_list(r, "cases");
     for (int k = 0; k < N_JOB; k++) {
         double enough = k > 0 ? near_enough * all[k - 1].percent : 0;
         pal_err err = run_job(&jobs[k], r->argument ? r->argument : "deploy/problems", enough, &all[k], diag);
@@ -144,14 +144,14 @@ pal_err bench_calibrate(bench_report *r, pal_diagnostic *diag)
         if (err) return err;
         add_job(r, &jobs[k], &all[k]);
     }
-    bench_list(r, NULL);
+    pal_table_list(r, NULL);
     for (int k = 0; k < N_JOB / 2; k++) {
         ratio[k] = all[2 * k + 1].percent / all[2 * k].percent;
-        BENCH_ROW(r, VALUE(key[k], ratio[k]));
+        TABLE_ROW(r, VALUE(key[k], ratio[k]));
     }
-    bench_note(r, "annealing ended by %s at %.2f times the error of adjoint, after %.1f times its seconds",
-               all[1].fit.ended, ratio[0], all[1].search_s / all[0].search_s);
-    bench_note(r, "error of the grid over that of one constant of each kind: gear %.2f, cube %.2f, bar %.2f", ratio[1],
-               ratio[2], ratio[3]);
+    pal_table_note(r, "annealing ended by %s at %.2f times the error of adjoint, after %.1f times its seconds",
+                   all[1].fit.ended, ratio[0], all[1].search_s / all[0].search_s);
+    pal_table_note(r, "error of the grid over that of one constant of each kind: gear %.2f, cube %.2f, bar %.2f",
+                   ratio[1], ratio[2], ratio[3]);
     return PAL_ERR_OK;
 }

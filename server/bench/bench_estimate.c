@@ -185,12 +185,12 @@ static bool is_within(double off)
     return off <= max_ratio && off >= 1 / max_ratio;
 }
 
-static void add_neighbour(bench_report *report, const subject *s, const result *c, int k)
+static void add_neighbour(pal_table *report, const subject *s, const result *c, int k)
 {
     char text[64];
     const neighbour *r = &c->neighbour[k];
     const pal_estimate *e = &c->estimate;
-    BENCH_ROW(
+    TABLE_ROW(
         report, TEXT("body", "body", -30, s->name),
         TEXT("configuration", "configuration", -34, configuration_text(r, text)),
         NUMBER("nodes", "nodes", 6, 0, r->n_node), NUMBER("nodes_predicted", "predicted", 9, 0, e->neighbour_nodes[k]),
@@ -201,7 +201,7 @@ static void add_neighbour(bench_report *report, const subject *s, const result *
         NUMBER("predicted_error_m", "predicted", 10, 7, r->predicted.error_m));
 }
 
-pal_err bench_estimate(bench_report *r, pal_diagnostic *diag)
+pal_err bench_estimate(pal_table *r, pal_diagnostic *diag)
 {
     static const subject subjects[N_CASE] = {{"fem hex8_bbar, 12 voxels", 12, true, NULL, NULL, false},
                                              {"fem hex8_bbar, 18 voxels", 18, true, NULL, NULL, false},
@@ -213,7 +213,7 @@ pal_err bench_estimate(bench_report *r, pal_diagnostic *diag)
                                              {"springs, 12 voxels, twice", 12, false, NULL, NULL, true}};
     static result c;
     int n = 0, within = 0;
-    bench_list(r, "neighbours");
+    pal_table_list(r, "neighbours");
     for (int k = 0; k < N_CASE; k++) {
         PAL_TRY(measure(&subjects[k], &c, diag));
         for (int i = 0; i < c.estimate.n_neighbour; i++) {
@@ -222,8 +222,8 @@ pal_err bench_estimate(bench_report *r, pal_diagnostic *diag)
             add_neighbour(r, &subjects[k], &c, i);
         }
     }
-    bench_list(r, NULL);
-    BENCH_ROW(r, VALUE("n", n), VALUE("within", within));
-    bench_note(r, "cost within 30 %% for %d of %d neighbours", within, n);
+    pal_table_list(r, NULL);
+    TABLE_ROW(r, VALUE("n", n), VALUE("within", within));
+    pal_table_note(r, "cost within 30 %% for %d of %d neighbours", within, n);
     return PAL_ERR_OK;
 }

@@ -78,7 +78,7 @@ static pal_err load_face(pal_world *world, int axis, double low, double high, co
     return err;
 }
 
-static pal_err run_live(const job *j, bench_report *r, pal_diagnostic *diag)
+static pal_err run_live(const job *j, pal_table *r, pal_diagnostic *diag)
 {
     static double ms[N_STEP], force[N_STEP];
     static pal_scene scene;
@@ -106,7 +106,7 @@ static pal_err run_live(const job *j, bench_report *r, pal_diagnostic *diag)
     if (!err) {
         const pal_body *body = pal_world_body(world, 0);
         double p50_ms = pal_median(ms, N_STEP), p95_ms = ms[N_STEP * 95 / 100];
-        BENCH_ROW(r, TEXT("name", "body", -17, j->name), TEXT("element", "element", -10, j->element),
+        TABLE_ROW(r, TEXT("name", "body", -17, j->name), TEXT("element", "element", -10, j->element),
                   TEXT("law", "law", -13, j->law), NUMBER("nodes", "nodes", 5, 0, body->n_node),
                   NUMBER("elements", "elements", 8, 0, body->n_element),
                   NUMBER("step_ms", "step ms", 8, 2, 1e3 * j->step_s), NUMBER("p50_ms", "ms p50", 7, 3, p50_ms),
@@ -121,7 +121,7 @@ static pal_err run_live(const job *j, bench_report *r, pal_diagnostic *diag)
 }
 
 /* the reference cube: 0.1 m, nu 0.499, soft above stiff, a patch of its top loaded down and sideways */
-static pal_err run_static(int n, bench_report *r, pal_diagnostic *diag)
+static pal_err run_static(int n, pal_table *r, pal_diagnostic *diag)
 {
     const job j = {.element = "hex8_bbar",
                    .law = "linear",
@@ -152,7 +152,7 @@ static pal_err run_static(int n, bench_report *r, pal_diagnostic *diag)
         pal_solve_report report;
         double solve_ms = 1e3 * (pal_clock_s() - loaded);
         pal_world_solve_report(world, 0, &report);
-        BENCH_ROW(
+        TABLE_ROW(
             r, NUMBER("nodes", "nodes", 6, 0, pal_world_body(world, 0)->n_node),
             NUMBER("make_ms", "make ms", 8, 0, 1e3 * (made - began)), NUMBER("solve_ms", "solve ms", 8, 0, solve_ms),
             NUMBER("factor_ms", "factor ms", 9, 0, 1e3 * report.factor_s), NUMBER(NULL, "limit ms", 8, 0, 1500),
@@ -174,12 +174,12 @@ static const job jobs[] = {
 };
 enum { N_JOB = sizeof jobs / sizeof jobs[0] };
 
-pal_err bench_fem(bench_report *r, pal_diagnostic *diag)
+pal_err bench_fem(pal_table *r, pal_diagnostic *diag)
 {
-    bench_note(r, "live steps, medians of %d, one thread", N_STEP);
-    bench_list(r, "cases");
+    pal_table_note(r, "live steps, medians of %d, one thread", N_STEP);
+    pal_table_list(r, "cases");
     for (int k = 0; k < N_JOB; k++) PAL_TRY(run_live(&jobs[k], r, diag));
-    bench_note(r, "static cube, nu 0.499:");
-    bench_list(r, "static");
+    pal_table_note(r, "static cube, nu 0.499:");
+    pal_table_list(r, "static");
     return run_static(16, r, diag);
 }

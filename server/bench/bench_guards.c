@@ -9,7 +9,7 @@
 #include "server/base/clock.h"
 #include "server/bench/bench.h"
 #include "server/bench/bench_body.h"
-#include "server/mesh/geometry/organ.h"
+#include "server/mesh/geometry/procedural.h"
 #include "server/num/median.h"
 
 #include <math.h>
@@ -153,12 +153,12 @@ static const double max_share = 0.03;
 static const char not_timed[] = "search for inverted elements, caps of loads and displacements, choice of sub-steps, "
                                 "refusal of bad numbers, corrections of contacts";
 
-static void add_case(bench_report *r, const guards *c)
+static void add_case(pal_table *r, const guards *c)
 {
     /* a negative difference is noise */
     double checks_ms = c->finite_ms + fmax(0, c->energy_ms), share = (c->component_ms + checks_ms) / c->with_ms;
     const char *verdict = c->n_safeguard ? "something went wrong" : share <= max_share ? "ok" : "too much";
-    BENCH_ROW(r, TEXT("model", "model", -18, c->model), NUMBER("dofs", "dofs", 8, 0, c->n_point),
+    TABLE_ROW(r, TEXT("model", "model", -18, c->model), NUMBER("dofs", "dofs", 8, 0, c->n_point),
               NUMBER(NULL, "sub-steps", 10, 0, c->n_sub), VALUE("safeguards", c->n_safeguard),
               NUMBER("with_ms", "ms with", 12, 4, c->with_ms), NUMBER("without_ms", "ms without", 12, 4, c->without_ms),
               NUMBER("component_share", "component", 9, 4, c->component_ms / c->with_ms),
@@ -236,30 +236,30 @@ static pal_err measure_inverted(const bodies *b, int which, inverted *out, pal_d
     return err;
 }
 
-static void add_inverted(bench_report *r, int which, const inverted *t)
+static void add_inverted(pal_table *r, int which, const inverted *t)
 {
-    BENCH_ROW(r, TEXT("model", "model", -18, model_name[which]), NUMBER("whole_ms", "ms whole", 12, 4, t->whole_ms),
+    TABLE_ROW(r, TEXT("model", "model", -18, model_name[which]), NUMBER("whole_ms", "ms whole", 12, 4, t->whole_ms),
               NUMBER("first_ms", "ms first", 12, 4, t->first_ms), NUMBER("mean_ms", "ms mean", 12, 4, t->mean_ms),
               NUMBER("own_ms", "ms recovery", 12, 4, t->own_ms), VALUE("iterations", t->n_cg),
               NUMBER("ratio", "mean/whole", 12, 2, t->mean_ms / t->whole_ms),
               TEXT("verdict", "", 0, t->mean_ms <= 2 * t->whole_ms ? "ok" : "too much"));
 }
 
-pal_err bench_guards(bench_report *r, pal_diagnostic *diag)
+pal_err bench_guards(pal_table *r, pal_diagnostic *diag)
 {
     bodies b = {0};
     guards one;
-    BENCH_ROW(r, VALUE("max_share", max_share), TEXT("not_timed", NULL, 0, not_timed));
-    bench_note(r, "shares of a step, wanted at most %g together. Not timed: %s", max_share, not_timed);
-    bench_list(r, "cases");
+    TABLE_ROW(r, VALUE("max_share", max_share), TEXT("not_timed", NULL, 0, not_timed));
+    pal_table_note(r, "shares of a step, wanted at most %g together. Not timed: %s", max_share, not_timed);
+    pal_table_list(r, "cases");
     pal_err err = make_bodies(&b, diag);
     for (int k = 0; k < N_CASE && !err; k++) {
         err = measure(&b, k, &one, diag);
         if (!err) add_case(r, &one);
     }
-    bench_note(r, "steps from a tenth of the body inverted: the first, mean of %d, wanted at most two whole steps",
-               N_TURN);
-    bench_list(r, "inverted");
+    pal_table_note(r, "steps from a tenth of the body inverted: the first, mean of %d, wanted at most two whole steps",
+                   N_TURN);
+    pal_table_list(r, "inverted");
     for (int k = 0; k < N_CASE && !err; k++) {
         inverted t;
         if (k == 2) continue; /* a surface has no volume */

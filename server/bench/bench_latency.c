@@ -29,7 +29,7 @@ static double one(pal_session *session, sem_t *rung, const pal_pose *pose)
     }
 }
 
-pal_err bench_latency(bench_report *r, pal_diagnostic *diag)
+pal_err bench_latency(pal_table *r, pal_diagnostic *diag)
 {
     static double ms[POSES];
     const pal_surface_scene plain = {.label = -1};
@@ -51,9 +51,9 @@ pal_err bench_latency(bench_report *r, pal_diagnostic *diag)
     sem_destroy(&rung);
     pal_scene_free(loaded);
     double median_ms = pal_median(ms, POSES);
-    bench_note(r, "pose to frame inside the server; at most one step and 5 ms are wanted");
-    bench_list(r, "cases");
-    BENCH_ROW(r, NUMBER("poses", "poses", 6, 0, POSES), NUMBER("step_ms", "step ms", 8, 2, step_ms),
+    pal_table_note(r, "pose to frame inside the server; at most one step and 5 ms are wanted");
+    pal_table_list(r, "cases");
+    TABLE_ROW(r, NUMBER("poses", "poses", 6, 0, POSES), NUMBER("step_ms", "step ms", 8, 2, step_ms),
               NUMBER("median_ms", "median ms", 10, 2, median_ms),
               NUMBER("p99_ms", "p99 ms", 8, 2, ms[POSES * 99 / 100]), NUMBER("max_ms", "max ms", 8, 2, ms[POSES - 1]));
     return err;

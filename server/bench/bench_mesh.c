@@ -67,7 +67,7 @@ static double memory_of(const char *name)
     return 1024 * kb;
 }
 
-static pal_err run_case(const pal_surface *surface, const bench_case *c, bench_report *r, pal_diagnostic *diag)
+static pal_err run_case(const pal_surface *surface, const bench_case *c, pal_table *r, pal_diagnostic *diag)
 {
     double fill[N_RUN], split[N_RUN], total[N_RUN], peak_bytes = 0, n_tet = 0;
     pal_voxel_options options = {.resolution = c->resolution, .border = true};
@@ -93,7 +93,7 @@ static pal_err run_case(const pal_surface *surface, const bench_case *c, bench_r
         pal_tets_free(&tets);
     }
     double total_ms = pal_median(total, N_RUN);
-    BENCH_ROW(r, NUMBER("resolution", "resolution", 10, 0, c->resolution), NUMBER("tets", "tets", 9, 0, n_tet),
+    TABLE_ROW(r, NUMBER("resolution", "resolution", 10, 0, c->resolution), NUMBER("tets", "tets", 9, 0, n_tet),
               TEXT("method", "method", -8, report.method), NUMBER("fill_ms", "fill ms", 8, 2, pal_median(fill, N_RUN)),
               NUMBER("split_ms", "split ms", 8, 2, pal_median(split, N_RUN)),
               NUMBER("total_ms", "total ms", 8, 2, total_ms), NUMBER("limit_ms", "limit ms", 8, 0, c->limit_ms),
@@ -103,7 +103,7 @@ static pal_err run_case(const pal_surface *surface, const bench_case *c, bench_r
     return PAL_ERR_OK;
 }
 
-pal_err bench_mesh(bench_report *r, pal_diagnostic *diag)
+pal_err bench_mesh(pal_table *r, pal_diagnostic *diag)
 {
     pal_surface surface = {0};
     const pal_mesh_file_options options = {.weld = 0};
@@ -114,9 +114,10 @@ pal_err bench_mesh(bench_report *r, pal_diagnostic *diag)
     } else {
         PAL_TRY(make_body(&surface));
     }
-    BENCH_ROW(r, VALUE("triangles", surface.n_tri), VALUE("read_ms", read_ms), VALUE("runs", N_RUN));
-    bench_note(r, "%d triangles, one thread, medians of %d; read in %.1f ms", surface.n_tri, N_RUN, fmax(read_ms, 0));
-    bench_list(r, "cases");
+    TABLE_ROW(r, VALUE("triangles", surface.n_tri), VALUE("read_ms", read_ms), VALUE("runs", N_RUN));
+    pal_table_note(r, "%d triangles, one thread, medians of %d; read in %.1f ms", surface.n_tri, N_RUN,
+                   fmax(read_ms, 0));
+    pal_table_list(r, "cases");
     pal_err err = PAL_ERR_OK;
     for (int k = 0; !err && k < N_CASE; k++) err = run_case(&surface, &cases[k], r, diag);
     pal_surface_free(&surface);

@@ -195,17 +195,17 @@ static int prepare(bench *b)
     return refusal;
 }
 
-static void report(bench_report *r, const bench *b)
+static void report(pal_table *r, const bench *b)
 {
     double n = b->s.n_vertex;
-    BENCH_ROW(r, VALUE("vertices", n), VALUE("triangles", b->s.n_triangle), VALUE("order_s", b->order_s),
+    TABLE_ROW(r, VALUE("vertices", n), VALUE("triangles", b->s.n_triangle), VALUE("order_s", b->order_s),
               VALUE("asset_s", b->asset_s), VALUE("asset_bytes", b->asset_bytes));
-    bench_note(r, "%.0f vertices, %u triangles; order %.0f ms, asset %.0f ms, %.0f kB (%.1f bytes a vertex)", n,
-               b->s.n_triangle, 1e3 * b->order_s, 1e3 * b->asset_s, b->asset_bytes / 1e3, b->asset_bytes / n);
-    bench_list(r, "motions");
+    pal_table_note(r, "%.0f vertices, %u triangles; order %.0f ms, asset %.0f ms, %.0f kB (%.1f bytes a vertex)", n,
+                   b->s.n_triangle, 1e3 * b->order_s, 1e3 * b->asset_s, b->asset_bytes / 1e3, b->asset_bytes / n);
+    pal_table_list(r, "motions");
     for (int m = 0; m < MOTIONS; m++)
         for (int e = 0; e < BOUNDS; e++)
-            BENCH_ROW(r, TEXT("motion", "motion", -8, motion_name[m]), NUMBER("bound_m", "bound m", 10, 6, bound_m[e]),
+            TABLE_ROW(r, TEXT("motion", "motion", -8, motion_name[m]), NUMBER("bound_m", "bound m", 10, 6, bound_m[e]),
                       NUMBER("bytes", "bytes", 8, 0, b->byte_count[m][e]),
                       NUMBER(NULL, "bytes/vertex", 12, 3, b->byte_count[m][e] / n),
                       NUMBER("encode_ms", "encode ms", 10, 3, 1e3 * b->encode_s[m][e]),
@@ -213,7 +213,7 @@ static void report(bench_report *r, const bench *b)
                       NUMBER("max_error_m", "max error m", 12, 7, b->error_m[m][e]));
 }
 
-pal_err bench_protocol(bench_report *r, pal_diagnostic *diag)
+pal_err bench_protocol(pal_table *r, pal_diagnostic *diag)
 {
     static bench b;
     int refusal = prepare(&b);

@@ -26,7 +26,7 @@ static pal_err timed(pal_world *world, double step_s, bool awake, double *median
     return PAL_ERR_OK;
 }
 
-static pal_err measure_world(const char *name, const pal_scene *scene, bench_report *r, pal_diagnostic *diag)
+static pal_err measure_world(const char *name, const pal_scene *scene, pal_table *r, pal_diagnostic *diag)
 {
     pal_world *world;
     double awake_ms = 0, unobserved_ms = 0, asleep_ms = 0;
@@ -49,7 +49,7 @@ static pal_err measure_world(const char *name, const pal_scene *scene, bench_rep
     if (!err) pal_world_watch(world, false);
     if (!err) err = timed(world, scene->step_s, true, &unobserved_ms);
     if (!err)
-        BENCH_ROW(r, TEXT("name", "model", -18, name), NUMBER("nodes", "nodes", 8, 0, body->n_node),
+        TABLE_ROW(r, TEXT("name", "model", -18, name), NUMBER("nodes", "nodes", 8, 0, body->n_node),
                   NUMBER("awake_ms", "awake ms", 10, 4, awake_ms),
                   NUMBER("unobserved_ms", "unobserved ms", 13, 4, unobserved_ms),
                   NUMBER("asleep_ms", "asleep ms", 10, 5, asleep_ms),
@@ -60,7 +60,7 @@ static pal_err measure_world(const char *name, const pal_scene *scene, bench_rep
     return err;
 }
 
-static pal_err measure_solid(const pal_cell_model *model, bench_report *r, pal_diagnostic *diag)
+static pal_err measure_solid(const pal_cell_model *model, pal_table *r, pal_diagnostic *diag)
 {
     static pal_scene scene;
     pal_cells cells = {0};
@@ -80,13 +80,13 @@ static pal_err measure_solid(const pal_cell_model *model, bench_report *r, pal_d
     return err;
 }
 
-pal_err bench_sleep(bench_report *r, pal_diagnostic *diag)
+pal_err bench_sleep(pal_table *r, pal_diagnostic *diag)
 {
     static const char *const name[3] = {"tet_springs", "fem", "adaptive_springs"};
     const pal_surface_scene organ[3] = {
         {.label = -1}, {.label = -1, .fem = true}, {.label = -1, .adaptive = true, .shape = "stomach"}};
-    bench_note(r, "a body at rest, medians of %d steps; wanted: asleep at most %.2f of awake", N_STEP, max_share);
-    bench_list(r, "cases");
+    pal_table_note(r, "a body at rest, medians of %d steps; wanted: asleep at most %.2f of awake", N_STEP, max_share);
+    pal_table_list(r, "cases");
     for (int k = 0; k < 3; k++) {
         pal_loaded_scene *loaded = NULL;
         PAL_TRY(pal_scene_procedural(&organ[k], &loaded, NULL, diag));

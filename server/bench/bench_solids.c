@@ -57,7 +57,6 @@ static pal_err start(const pal_cell_model *model, const char *operator, const ch
     return pal_world_create(b->scene, diag, &b->world);
 }
 
-/* what the steps of a run take */
 typedef struct run {
     double median_ms, mean_cg, max_cg;
     int n_sub; /* at most */
@@ -93,11 +92,11 @@ typedef struct result {
     double make_ms; /* world with implicit_euler, its factor */
 } result;
 
-static void add_case(bench_report *r, const pal_cell_model *m, const body *b, const result *c)
+static void add_case(pal_table *r, const pal_cell_model *m, const body *b, const result *c)
 {
     const pal_body *of = pal_world_body(b->world, 0);
     const pal_cell_elements *e = &of->model.solid->elements;
-    BENCH_ROW(r, TEXT("name", "solid", -8, m->name), NUMBER("levels", "levels", 6, 0, m->n_level),
+    TABLE_ROW(r, TEXT("name", "solid", -8, m->name), NUMBER("levels", "levels", 6, 0, m->n_level),
               NUMBER("cells", "#CC", 4, 0, b->cells.n_cell), VALUE("control_points", of->n_dof),
               NUMBER("elements", "#FE", 5, 0, pal_cell_elements_count(e)),
               NUMBER("paper_elements", "paper", 5, 0, m->n_element),
@@ -118,11 +117,11 @@ static void add_case(bench_report *r, const pal_cell_model *m, const body *b, co
               NUMBER("implicit_cg", "CG", 5, 1, c->implicit_frame.mean_cg),
               NUMBER("implicit_make_ms", "make ms", 7, 0, c->make_ms));
     if (c->paper_ms / c->step[0].median_ms < min_ratio)
-        bench_note(r, "%s: %.0f times the speed of the paper, wanted %.0f", m->name, c->paper_ms / c->step[0].median_ms,
-                   min_ratio);
+        pal_table_note(r, "%s: %.0f times the speed of the paper, wanted %.0f", m->name,
+                       c->paper_ms / c->step[0].median_ms, min_ratio);
 }
 
-static pal_err measure(const pal_cell_model *model, bench_report *r, pal_diagnostic *diag)
+static pal_err measure(const pal_cell_model *model, pal_table *r, pal_diagnostic *diag)
 {
     static pal_scene scene;
     body b = {.scene = &scene};
@@ -153,14 +152,14 @@ static pal_err measure(const pal_cell_model *model, bench_report *r, pal_diagnos
     return err;
 }
 
-pal_err bench_solids(bench_report *r, pal_diagnostic *diag)
+pal_err bench_solids(pal_table *r, pal_diagnostic *diag)
 {
-    BENCH_ROW(r, VALUE("steps", N_STEP), VALUE("frames", N_FRAME), VALUE("frame_s", frame_s));
-    bench_note(r,
-               "paper A, Table 1, one core; medians of %d iterations, of %d frames; CG: conjugate gradients in one "
-               "iteration, with a factor and (as in the paper) with the diagonal",
-               N_STEP, N_FRAME);
-    bench_list(r, "cases");
+    TABLE_ROW(r, VALUE("steps", N_STEP), VALUE("frames", N_FRAME), VALUE("frame_s", frame_s));
+    pal_table_note(r,
+                   "paper A, Table 1, one core; medians of %d iterations, of %d frames; CG: conjugate gradients in one "
+                   "iteration, with a factor and (as in the paper) with the diagonal",
+                   N_STEP, N_FRAME);
+    pal_table_list(r, "cases");
     for (int k = 0; k < PAL_CELL_MODELS; k++) PAL_TRY(measure(&pal_cell_model_list[k], r, diag));
     return PAL_ERR_OK;
 }

@@ -9,7 +9,7 @@
 #include "server/bench/bench_body.h"
 
 #include "server/base/clock.h"
-#include "server/mesh/geometry/organ.h"
+#include "server/mesh/geometry/procedural.h"
 
 #include "server/num/median.h"
 #include <math.h>
@@ -126,7 +126,7 @@ static pal_err run_world(const pal_scene *scene, result *out, pal_diagnostic *di
 }
 
 static pal_err run_case(const char *name, const pal_prepared *mesh, double limit_ms, const double machine[2],
-                        bench_report *r, pal_diagnostic *diag)
+                        pal_table *r, pal_diagnostic *diag)
 {
     static pal_scene scene;
     result c = {0};
@@ -139,7 +139,7 @@ static pal_err run_case(const char *name, const pal_prepared *mesh, double limit
     PAL_TRY(count_work(&mesh->tets, &c));
     PAL_TRY(run_world(&scene, &c, diag));
     double gflops = 1e-6 * c.flop / c.ms[0], gbs = 1e-6 * c.byte / c.ms[0];
-    BENCH_ROW(r, TEXT("name", "body", -10, name), NUMBER("tets", "tets", 7, 0, mesh->tets.n_tet),
+    TABLE_ROW(r, TEXT("name", "body", -10, name), NUMBER("tets", "tets", 7, 0, mesh->tets.n_tet),
               NUMBER("nodes", "nodes", 7, 0, mesh->tets.n_node), NUMBER("substep_ms", "ms/sub-step", 11, 3, c.ms[0]),
               NUMBER("edge_distance_ms", "edges", 6, 3, c.ms[1]), NUMBER("face_area_ms", "faces", 6, 3, c.ms[2]),
               NUMBER("tet_volume_ms", "tets", 6, 3, c.ms[3]), NUMBER("verlet_ms", "verlet", 7, 3, c.ms[4]),
@@ -151,16 +151,16 @@ static pal_err run_case(const char *name, const pal_prepared *mesh, double limit
     return PAL_ERR_OK;
 }
 
-pal_err bench_springs(bench_report *r, pal_diagnostic *diag)
+pal_err bench_springs(pal_table *r, pal_diagnostic *diag)
 {
     static const int box[2][3] = {{20, 13, 10}, {40, 26, 25}};
     static const char *const name[N_CASE] = {"box 13k", "box 130k", "organ 13k"};
     static const double limit_ms[N_CASE] = {0.25, 3, 0.25};
     const double machine[2] = {measure_triad(), measure_fma()};
-    BENCH_ROW(r, VALUE("steps", N_STEP), VALUE("triad_GB_s", machine[0]), VALUE("fma_GFLOP_s", machine[1]));
-    bench_note(r, "one thread, medians of %d steps; this machine: triad %.1f GB/s, multiply-add %.1f GFLOP/s", N_STEP,
-               machine[0], machine[1]);
-    bench_list(r, "cases");
+    TABLE_ROW(r, VALUE("steps", N_STEP), VALUE("triad_GB_s", machine[0]), VALUE("fma_GFLOP_s", machine[1]));
+    pal_table_note(r, "one thread, medians of %d steps; this machine: triad %.1f GB/s, multiply-add %.1f GFLOP/s",
+                   N_STEP, machine[0], machine[1]);
+    pal_table_list(r, "cases");
     pal_err err = PAL_ERR_OK;
     for (int k = 0; k < N_CASE && !err; k++) {
         pal_prepared mesh = {0};

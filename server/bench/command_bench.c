@@ -1,6 +1,6 @@
 /* `palpate bench NAME`: finds the bench, runs it and reports its results. */
 #include "server/bench/bench.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -27,7 +27,7 @@ enum { BENCHES = sizeof bench_table / sizeof bench_table[0] };
 
 static int run_bench(int index, const char *argument, const pal_flag_common *common)
 {
-    bench_report r = {.argument = argument, .json = common->json, .root = cJSON_CreateObject()};
+    pal_table r = {.argument = argument, .silent = common->json, .root = cJSON_CreateObject()};
     pal_diagnostic diag = {""};
     cJSON_AddBoolToObject(r.root, "ok", true);
     cJSON_AddStringToObject(r.root, "bench", bench_table[index].name);
@@ -50,8 +50,7 @@ int command_bench(int argc, char **argv)
                                   .about = about,
                                   .example = "palpate bench protocol\n",
                                   PAL_FLAGS(flag),
-                                  .min_operand = 1,
-                                  .max_operand = 2};
+                                  .operands = {1, 2}};
     pal_flag_common common;
     int code = pal_flags_parse(&table, argc, argv, &common, word, &n);
     if (code >= 0) return code;

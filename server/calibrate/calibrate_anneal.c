@@ -86,8 +86,6 @@ static void make_box(fit *f, const double *theta)
     }
 }
 
-/* ---- evaluations ---- */
-
 static void evaluate_one(void *user, int worker, int index)
 {
     fit *f = user;
@@ -98,7 +96,6 @@ static void evaluate_one(void *user, int worker, int index)
     if (err == PAL_ERR_MEMORY) f->err[worker] = err;
 }
 
-/* evaluates a batch of the walk */
 static pal_err evaluate(void *user, const double *p, int n, double *cost)
 {
     fit *f = user;

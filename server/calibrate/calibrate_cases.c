@@ -1,9 +1,9 @@
 /* Resolves names of load cases and references to cases with their truths. */
 #include "server/calibrate/calibrate_cases.h"
 
+#include "server/base/flags.h"
 #include "server/base/vec3.h"
 #include "server/calibrate/tuning.h"
-#include "server/cli/flag.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/problem_file.h"
 
@@ -14,7 +14,6 @@
 
 enum { ENOUGH_NODES = 700, FINEST = 64 };
 
-/* input of every function of one reading */
 typedef struct job {
     const pal_calibrate_input *input;
     pal_calibrate_cases *set;
@@ -27,8 +26,6 @@ static bool is(const char *word, const char *what)
 {
     return word && !strcmp(word, what);
 }
-
-/* ---- which cases ---- */
 
 static pal_err add_case(job *j, const char *id, bool fit)
 {
@@ -64,8 +61,6 @@ static pal_err add_list(job *j, const char *list, bool fit)
     return PAL_ERR_OK;
 }
 
-/* ---- material ---- */
-
 static bool same(double a, double b)
 {
     return fabs(a - b) <= 1e-9 * fabs(b);
@@ -96,8 +91,6 @@ static pal_err settle_material(job *j)
     s->problem->material[0].poisson = poisson;
     return PAL_ERR_OK;
 }
-
-/* ---- truths ---- */
 
 static bool answers(const job *j, int index, const pal_problem_reference *r)
 {
@@ -161,8 +154,6 @@ static pal_err choose_truths(job *j)
     }
     return PAL_ERR_OK;
 }
-
-/* ---- the body ---- */
 
 /* refuses points (frame of the file) far outside the surface's box */
 static pal_err check_box(const job *j, int index)

@@ -16,8 +16,6 @@
 
 enum { TITLE = 120, TITLE_SHOWN = 48, MAX_DRAWN = 4000 };
 
-/* ---- trajectory ---- */
-
 /* Thins out a long search. Each drawn evaluation is the worst (error) or the best of those it represents. */
 static int thin_out(const pal_calibrate_run *run, double *x, double *error, double *best)
 {
@@ -64,8 +62,6 @@ pal_err pal_calibrate_draw_trajectory(const pal_calibrate_run *run, const char *
     return err;
 }
 
-/* ---- displacements ---- */
-
 /* Truth at the nodes [n_node][3]. For samples: the mean of the four nearest, weighted by inverse squared distance,
  * which suffices for a picture. */
 static pal_err truth_at_nodes(const pal_calibrate_run *run, int index, double *u, pal_diagnostic *diag)
@@ -103,8 +99,6 @@ static bool springs_at_nodes(const pal_calibrate_run *run, const double *theta, 
     if (!good) memset(u, 0, 3 * sizeof *u * (size_t)run->info.n_node);
     return good;
 }
-
-/* ---- the displayed body ---- */
 
 enum { REST, TRUTH, START, FOUND, N_SHAPE };
 
@@ -200,8 +194,6 @@ static void take_vertices(drawing *d)
     pal_calibration_constants(d->run->calibration, d->run->theta, 0, d->value);
     skin_value(d, d->value, d->k_d);
 }
-
-/* ---- pictures ---- */
 
 /* the body at rest with its loads, its truth, start and result */
 static void add_shapes(drawing *d, pal_body_picture *to, char title[][TITLE])

@@ -9,8 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- workspace ---- */
-
 static pal_err make_workspace(const pal_calibration *c, pal_calibration_workspace *s)
 {
     const int n = 3 * c->lattice.n_node;
@@ -98,8 +96,6 @@ static void gather_slopes(pal_calibration_workspace *s, const double *theta)
     }
 }
 
-/* ---- one case ---- */
-
 /* e_L in per cent; dJ_du of mean e_L^2 over the fitted cases */
 static double compare(const pal_calibration *c, const pal_fit_case *fit, const double *x, double *dJ_du)
 {
@@ -164,8 +160,6 @@ static pal_err evaluate_case(pal_calibration_workspace *s, const double *theta, 
     if (!err) gather_slopes(s, theta);
     return err;
 }
-
-/* ---- all cases ---- */
 
 static void regularise(const pal_calibration *c, const double *theta, pal_calibration_value *out, double *slope)
 {

@@ -9,7 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* input of every function of one calibration */
 typedef struct job {
     pal_calibration *c;
     const pal_surface *surface;

@@ -226,7 +226,6 @@ static void assemble(pal_equilibrium_workspace *workspace, const double *const k
 
 /* ---- Newton ---- */
 
-/* input of one search */
 typedef struct search {
     pal_equilibrium_workspace *workspace;
     const double *const *k_J;

@@ -25,8 +25,6 @@ static pal_err no_io(const pal_journal *j, const char *what, pal_diagnostic *dia
     return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s: %s", j->path, what, strerror(errno));
 }
 
-/* ---- the results in memory ---- */
-
 /* keeps the result of a sound line of n bytes */
 static pal_err keep(pal_journal *j, const char *line, size_t n)
 {
@@ -53,8 +51,6 @@ int pal_journal_count(const pal_journal *j)
 {
     return j->n;
 }
-
-/* ---- the file ---- */
 
 static void check_of(const char *line, size_t n, char out[DIGITS + 1])
 {

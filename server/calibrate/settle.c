@@ -103,9 +103,6 @@ pal_err pal_settle(pal_world *world, double step_s, const pal_settle_load *load,
     return PAL_ERR_OK;
 }
 
-/* ---- search over the rates ---- */
-
-/* state of one search */
 typedef struct climb {
     pal_world *world;
     const pal_scene *scene;

@@ -2,6 +2,7 @@
 #include "server/cli/config.h"
 
 #include "server/base/utf8.h"
+#include "server/cli/report.h"
 #include "server/mesh/files/file_bytes.h"
 
 #include <cjson/cJSON.h>
@@ -9,8 +10,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
-enum { FILE_MAX = 1 << 16, VARIABLE = 64 };
+enum { FILE_MAX = 1 << 16, VARIABLE = 64, OWN_FLAGS = 40 };
 static const char levels[] = "error|warn|info|debug";
 
 const pal_flag pal_config_keys[PAL_CONFIG_KEYS] = {
@@ -147,4 +149,39 @@ pal_err pal_config_environment(pal_config *config, char *const *variable, pal_di
     }
     *config = fresh;
     return PAL_ERR_OK;
+}
+
+int pal_config_parse_flags(const pal_flag_table *own, pal_config *config, int argc, char **argv,
+                           pal_flag_common *common, const char **operand, int *n_operand)
+{
+    const char *file = getenv("PALPATE_CONFIG"), *given[PAL_CONFIG_KEYS] = {NULL};
+    char name[PAL_CONFIG_KEYS][VARIABLE];
+    pal_flag all[OWN_FLAGS + PAL_CONFIG_KEYS + 1], *flag = all;
+    pal_diagnostic diag = {""};
+    for (int k = 0; k < own->n_flag; k++) *flag++ = own->flag[k];
+    for (int k = 0; k < PAL_CONFIG_KEYS; k++, flag++) {
+        snprintf(name[k], VARIABLE, "--%s", pal_config_keys[k].name);
+        for (char *c = name[k]; *c; c++)
+            if (*c == '_') *c = '-';
+        *flag = pal_config_keys[k];
+        flag->name = name[k], flag->kind = PAL_FLAG_TEXT, flag->out = &given[k];
+    }
+    *flag++ =
+        (pal_flag){"--config", "FILE", PAL_FLAG_TEXT, &file, 0, 0, "JSON file of these keys (PALPATE_CONFIG, or none)"};
+    pal_flag_table table = *own;
+    table.flag = all, table.n_flag = (int)(flag - all);
+    table.note =
+        "The file and the environment take the same keys (allow_remote, PALPATE_ALLOW_REMOTE). Flags override\n"
+        "the environment, the environment overrides the file.\n";
+    int code = pal_flags_parse(&table, argc, argv, common, operand, n_operand);
+    if (code >= 0) return code;
+    pal_config_default(config);
+    pal_err err = file && *file ? pal_config_file(config, file, &diag) : PAL_ERR_OK;
+    if (!err) err = pal_config_environment(config, environ, &diag);
+    if (err) return pal_report_refusal(common, err, &diag);
+    /* a bad flag is wrong usage, a bad file or variable is refused input */
+    for (int k = 0; k < PAL_CONFIG_KEYS; k++)
+        if (given[k] && pal_config_set(config, pal_config_keys[k].name, given[k], name[k], &diag))
+            return pal_flags_wrong(common, "%s", diag.text);
+    return -1;
 }

@@ -6,8 +6,8 @@
  * source. Thread: [load]. */
 #ifndef PAL_CLI_CONFIG_H
 #define PAL_CLI_CONFIG_H
+#include "server/base/flags.h"
 #include "server/base/log.h"
-#include "server/cli/flag.h"
 
 enum { PAL_CONFIG_TEXT = 256, PAL_CONFIG_KEYS = 9 };
 
@@ -37,4 +37,8 @@ pal_err pal_config_environment(pal_config *config, char *const *variable, pal_di
 /* one key from text; where ("--port", "PALPATE_PORT") is used in messages */
 pal_err pal_config_set(pal_config *config, const char *key, const char *text, const char *where, pal_diagnostic *diag);
 pal_log_level pal_config_log_level(const pal_config *config);
+/* pal_flags_parse with every key as a flag as well (allow_remote: --allow-remote), and --config FILE; on success the
+ * struct holds defaults < file < environment < flags. 1: a refused file or environment */
+int pal_config_parse_flags(const pal_flag_table *own, pal_config *config, int argc, char **argv,
+                           pal_flag_common *common, const char **operand, int *n_operand);
 #endif

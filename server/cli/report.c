@@ -20,7 +20,7 @@ int pal_report_refusal(const pal_flag_common *common, pal_err err, const pal_dia
     for (char *c = text; *c; c++)
         if ((unsigned char)*c < 0x20 || *c == 0x7f) *c = ' ';
     pal_report_progress(NULL, 0, (void *)(uintptr_t)common);
-    fprintf(stderr, "palpate %s: %s\n", common->command, text);
+    fprintf(stderr, "%s: %s\n", common->program, text);
     if (common->json)
         pal_report_json(
             common, PAL_JSON({"ok", JSON_BOOL(false)},
@@ -30,11 +30,8 @@ int pal_report_refusal(const pal_flag_common *common, pal_err err, const pal_dia
 
 int pal_report_json(const pal_flag_common *common, cJSON *object)
 {
-    char *text = object ? cJSON_PrintUnformatted(object) : NULL;
-    bool good = text && printf("%s\n", text) >= 0 && fflush(stdout) == 0;
-    cJSON_free(text);
-    cJSON_Delete(object);
-    if (!good) fprintf(stderr, "palpate %s: the JSON object could not be written\n", common->command);
+    bool good = pal_json_write(stdout, object);
+    if (!good) fprintf(stderr, "%s: the JSON object could not be written\n", common->program);
     return good ? 0 : 3;
 }
 

@@ -1,16 +1,10 @@
 /* Output of a command: refusals, progress and the one JSON object. Thread: [load]. */
 #ifndef PAL_CLI_REPORT_H
 #define PAL_CLI_REPORT_H
-#include "server/base/err.h"
+#include "server/base/flags.h"
 #include "server/base/json_members.h"
 
 #include <stdbool.h>
-
-/* flags that every command has */
-typedef struct pal_flag_common {
-    bool json, quiet;
-    const char *command; /* for messages: argv[0] */
-} pal_flag_common;
 
 /* exit code of an error: 0 ok, 3 for INTERNAL and MEMORY, else 1 */
 int pal_report_code(pal_err err);

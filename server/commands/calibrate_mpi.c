@@ -9,7 +9,7 @@
 #include "server/base/team.h"
 #include "server/calibrate/calibrate_cases.h"
 #include "server/calibrate/journal.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "server/mesh/files/file_bytes.h"
 #include "server/num/anneal.h"
 #include "server/scene/scene_file.h"
@@ -30,7 +30,6 @@ static const char about[] =
     "is refused is reported and the next one started. -o DIR: DIR/NAME.json with the constants of each\n"
     "(NAME_S.json with several seeds S).\n";
 
-/* the state of one process */
 typedef struct job {
     pal_flag_common common;
     const char *problem[MAX_PROBLEM];
@@ -430,8 +429,7 @@ static int parse(job *j, int argc, char **argv)
                                       "mpirun --oversubscribe -n 2 palpate-calibrate-mpi deploy/problems/gear.json "
                                       "--case twist --resolution 8 --evaluations 40 --journal gear.txt -o fits\n",
                                   PAL_FLAGS(flag),
-                                  .min_operand = 1,
-                                  .max_operand = MAX_PROBLEM};
+                                  .operands = {1, MAX_PROBLEM}};
     pal_calibrate_default(&j->options);
     j->options.voxel.resolution = 0;
     j->n_worker = 1;

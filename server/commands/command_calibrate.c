@@ -3,7 +3,7 @@
 #include "server/base/clock.h"
 #include "server/base/heap.h"
 #include "server/calibrate/calibrate_run.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/commands/tuning.h"
 #include "server/num/median.h"
@@ -537,8 +537,7 @@ int command_calibrate(int argc, char **argv)
                                              "palpate calibrate deploy/problems/cube.json --case push --grid 3x3x3 "
                                              "--resolution 6 --budget 5 --picture cube.svg -o cube.json\n",
                                   PAL_FLAGS(flag),
-                                  .min_operand = 1,
-                                  .max_operand = 1};
+                                  .operands = {1, 1}};
     int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.input.problem, &n);
     if (code >= 0) return code;
     const char *sentence = read_arguments(&run, &args);

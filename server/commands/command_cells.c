@@ -1,6 +1,6 @@
 /* `palpate cells`: control cells of a primitive, of a named solid or of a file, subdivided and written as cells or as
  * their boundary, with the figures of paper A, Table 1. */
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/mesh/cells/cell_elements.h"
 #include "server/mesh/cells/cell_file.h"
@@ -26,7 +26,6 @@ typedef struct arguments {
     bool list;
 } arguments;
 
-/* a solid: control cells, subdivided cells, figures */
 typedef struct outcome {
     char name[128];
     const pal_cell_model *model; /* NULL: another shape */
@@ -45,8 +44,6 @@ static void free_outcome(outcome *o)
     pal_subdivision_free(&o->made);
     pal_cell_elements_free(&o->elements);
 }
-
-/* ---- shapes ---- */
 
 /* a primitive: what its numbers of cells and its sizes mean, and their defaults */
 typedef struct primitive {
@@ -104,8 +101,6 @@ static pal_err make_primitive(const primitive *p, const double count[3], const d
         return pal_cells_torus(n[0], n[1], size_m[0], size_m[1], out, diag);
     }
 }
-
-/* ---- figures ---- */
 
 static pal_err measure(outcome *o, pal_diagnostic *diag)
 {
@@ -251,11 +246,9 @@ static int run(const pal_flag_common *common, outcome *o, const arguments *args,
     pal_err err = subdivide(o, args->n_level, rule, &diag);
     if (!err && args->file) err = write_file(o, args->file, &diag);
     if (err) return pal_report_refusal(common, err, &diag);
-    if (common->json) {
-        cJSON *object = as_json(o, args->rule);
-        if (args->file) cJSON_AddStringToObject(object, "file", args->file);
-        return pal_report_json(common, object);
-    }
+    if (common->json)
+        return pal_report_json(
+            common, PAL_JSON_ADD(as_json(o, args->rule), {"file", args->file ? JSON_TEXT(args->file) : NULL}));
     if (common->quiet) return 0;
     print(o, args->rule);
     if (args->file && ends_in(args->file, cell_end)) printf("wrote the cells to %s\n", args->file);
@@ -321,7 +314,7 @@ int command_cells(int argc, char **argv)
                                              "palpate cells block --cells 3,2,2 --size-m 0.12,0.06,0.06 -o "
                                              "block.palcells\n",
                                   PAL_FLAGS(flag),
-                                  .max_operand = 1};
+                                  .operands = {0, 1}};
     pal_flag_common common;
     const char *word[1] = {NULL};
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);

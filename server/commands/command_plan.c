@@ -2,7 +2,7 @@
  * machine; the effects that are absent and what would call for them. The time is the median over up to 60 steps, or as
  * many as fit into two seconds, of a body at rest that is kept awake. */
 #include "server/base/clock.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/commands/preflight_report.h"
 #include "server/commands/scene_input.h"
@@ -47,8 +47,6 @@ static double component_ms(cost *c, int component)
 {
     return component < PAL_FRAME_COMPONENT_MAX ? pal_median(c->component_ms[component], c->n_step) : 0;
 }
-
-/* ---- what calls for an effect ---- */
 
 /* The effects that a model adds are in the table; of the others the stage determines which entry adds them, so that a
  * new effect needs no line here. */
@@ -233,8 +231,7 @@ int command_plan(int argc, char **argv)
             "SCENE is a scene.json, its folder, control cells (.palcells), a surface or a scan.\n",
         .example = "palpate prepare --procedural -o organ\n"
                    "palpate plan organ/scene.json\n",
-        .min_operand = 1,
-        .max_operand = 1};
+        .operands = {1, 1}};
     pal_flag_common common;
     const char *word[1];
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);

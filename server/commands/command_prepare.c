@@ -3,7 +3,8 @@
  * a part of a scene. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
+#include "server/cli/table.h"
 #include "server/commands/commands.h"
 #include "server/commands/tuning.h"
 #include "server/mesh/files/mesh_file.h"
@@ -70,18 +71,13 @@ static int list_labels(const pal_flag_common *common, const char *path)
     if (err) return pal_report_refusal(common, err, &diag);
     int n = pal_label_volume_list(&volume, count, LABELS);
     pal_label_volume_free(&volume);
-    if (!common->json) {
-        if (!common->quiet) printf("%10s %12s %12s\n", "label", "voxels", "millilitres");
-        for (int k = 0; k < n && !common->quiet; k++)
-            printf("%10d %12lld %12.1f\n", count[k].label, (long long)count[k].n_voxel, 1e6 * count[k].volume_m3);
-        return 0;
-    }
-    cJSON *list = cJSON_CreateArray();
+    pal_table t = {.silent = common->json || common->quiet, .root = PAL_JSON({"ok", JSON_BOOL(true)})};
+    pal_table_list(&t, "labels");
     for (int k = 0; k < n; k++)
-        cJSON_AddItemToArray(list,
-                             PAL_JSON({"label", JSON_NUMBER(count[k].label)}, {"voxels", JSON_NUMBER(count[k].n_voxel)},
-                                      {"volume_m3", JSON_NUMBER(count[k].volume_m3)}));
-    return pal_report_json(common, PAL_JSON({"ok", JSON_BOOL(true)}, {"labels", list}));
+        TABLE_ROW(&t, NUMBER("label", "label", 10, 0, count[k].label),
+                  NUMBER("voxels", "voxels", 12, 0, (double)count[k].n_voxel),
+                  NUMBER(NULL, "millilitres", 12, 1, 1e6 * count[k].volume_m3), VALUE("volume_m3", count[k].volume_m3));
+    return pal_report_end(common, PAL_ERR_OK, &diag, t.root);
 }
 
 /* ---- writing ---- */
@@ -407,8 +403,8 @@ static const pal_flag flag[] = {
     {"--shape", "organ|stomach|sphere|sheet", PAL_FLAG_WORD, &args.scene.shape, 0, 0,
      "without IN: a computed shape; all but organ are adaptive"},
     {"--model", "springs|fem|adaptive", PAL_FLAG_WORD, &args.model, 0, 0,
-     "mass-spring tetrahedra (paper B); finite elements, implicit; or a surface of springs that\nrefines where it is "
-     "touched (paper C) (springs)"},
+     "mass-spring tetrahedra (paper B); finite elements, implicit; or a surface of springs that\n"
+     "refines where it is touched (paper C) (springs)"},
     {"--resolution", "N", PAL_FLAG_COUNT, &args.scene.resolution, 1, 1024,
      "voxels along the longest axis (the number that gives 13,000 tetrahedra, or 2,500 nodes for fem)"},
     {"--element", "hex8_bbar|hex8|tet4|tet10", PAL_FLAG_WORD, &args.scene.element, 0, 0, "fem: element (hex8_bbar)"},
@@ -417,9 +413,8 @@ static const pal_flag flag[] = {
     {"--solver", "implicit_euler|sdirk2|static_newton", PAL_FLAG_WORD, &args.scene.solver, 0, 0,
      "fem: time integration (implicit_euler)"},
     {"--levels", "N", PAL_FLAG_COUNT, &args.scene.n_level, 1, PAL_LEVELS_MAX,
-     "adaptive: levels of detail; the surface is the coarsest, each level has four times the springs\nof the one "
-     "before "
-     "(2)"},
+     "adaptive: levels of detail; the surface is the coarsest, each level has four times the springs\n"
+     "of the one before (2)"},
     {"--thickness-mm", "T", PAL_FLAG_NUMBER, &args.thickness_mm, 1e-3, 1000, "adaptive: thickness of the wall (3)"},
     {"--inflate", "PA", PAL_FLAG_NUMBER, &args.scene.inflate_Pa, -1e6, 1e6,
      "adaptive: pressure inside above that outside; closed surfaces only (0)"},
@@ -463,7 +458,7 @@ int command_prepare(int argc, char **argv)
                                              "palpate prepare deploy/problems/gear.obj --model fem --hold 12 -o gear\n"
                                              "palpate prepare --shape stomach -o stomach\n",
                                   PAL_FLAGS(flag),
-                                  .max_operand = 1};
+                                  .operands = {0, 1}};
     pal_flag_common common;
     const char *in[1] = {NULL};
     int n_in = 0, code = pal_flags_parse(&table, argc, argv, &common, in, &n_in);

@@ -1,6 +1,6 @@
 /* `palpate replay`: runs an input log against its scene and compares the state hashes. */
 #include "server/base/clock.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/commands/scene_input.h"
 #include "server/session/replay.h"
@@ -29,8 +29,7 @@ int command_replay(int argc, char **argv)
         .example = "palpate prepare --procedural -o organ\n"
                    "palpate serve organ/scene.json --record organ.log --port 0 --seconds 2\n"
                    "palpate replay organ.log organ/scene.json\n",
-        .min_operand = 2,
-        .max_operand = 2};
+        .operands = {2, 2}};
     pal_flag_common common;
     const char *word[2];
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);

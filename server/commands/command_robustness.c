@@ -1,7 +1,7 @@
 /* `palpate robustness SCENE...`: the cases of server/robustness on scenes, what happened and whether that meets the
  * criterion. Exit code 1 when a case failed or could not be judged. Several scenes run in parallel, one on a core. */
 #include "server/base/team.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/commands/robustness_table.h"
 #include "server/commands/scene_input.h"
@@ -382,7 +382,7 @@ int command_robustness(int argc, char **argv)
                    "palpate robustness ball/scene.json --only meganewton --seconds 20\n"
                    "palpate robustness --generate branched:5,lobed:7 --model fem --only inside --table inside.md\n",
         PAL_FLAGS(flag),
-        .max_operand = JOBS / 2};
+        .operands = {0, JOBS / 2}};
     pal_flag_common common;
     const char *word[JOBS / 2], *name;
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);

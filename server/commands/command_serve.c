@@ -8,7 +8,8 @@
 #include "server/base/clock.h"
 #include "server/base/log.h"
 #include "server/base/thread.h"
-#include "server/cli/flags.h"
+#include "server/cli/config.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/commands/preflight_report.h"
 #include "server/commands/tuning.h"
@@ -395,9 +396,8 @@ int command_serve(int argc, char **argv)
                                              "palpate cells chair -o chair.palcells\n"
                                              "palpate serve chair.palcells --port 0 --seconds 2\n",
                                   PAL_FLAGS(flag),
-                                  .max_operand = MAX_SESSIONS,
-                                  .config = &run.config};
-    int code = pal_flags_parse(&table, argc, argv, &run.common, input, &n_input);
+                                  .operands = {0, MAX_SESSIONS}};
+    int code = pal_config_parse_flags(&table, &run.config, argc, argv, &run.common, input, &n_input);
     if (code >= 0) return code;
     if (help_protocol) {
         static char text[8192];

@@ -1,6 +1,7 @@
 /* `palpate solve`: a load case of a problem -> displacements, the error against a reference, files for other tools. */
 #include "server/base/clock.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
+#include "server/cli/table.h"
 #include "server/commands/commands.h"
 #include "server/figure/plot.h"
 #include "server/mesh/files/mesh_file.h"
@@ -332,59 +333,41 @@ static pal_err draw(const study *s, const arguments *args, const series *all, bo
     return pal_plot_write(&plot, path, diag);
 }
 
-static cJSON *point_json(const char *element, const pal_convergence_point *p)
+/* the rows on stdout or in the object of --json */
+static cJSON *show_table(pal_flag_common *common, const study *s, const arguments *args, const series *all,
+                         const char *const file[2])
 {
-    const pal_solve_result *r = &p->result;
-    return PAL_JSON(
-        {"element", JSON_TEXT(element)}, {"resolution", JSON_NUMBER(p->resolution)},
-        {"voxel_m", JSON_NUMBER(r->edge_m)}, {"nodes", JSON_NUMBER(r->n_node)}, {"elements", JSON_NUMBER(r->n_element)},
-        {"dof", JSON_NUMBER(r->n_dof)}, {"rms_percent", pal_json_or_null(p->rms_percent)},
-        {"max_percent", pal_json_or_null(p->max_percent)}, {"order", pal_json_or_null(p->order)},
-        {"change_percent", pal_json_or_null(p->change_percent)}, {"change_order", pal_json_or_null(p->change_order)},
-        {"estimate_percent", pal_json_or_null(p->estimate_percent)}, {"iterations", JSON_NUMBER(r->n_newton)},
-        {"cg_iterations", JSON_NUMBER(r->n_cg)}, {"seconds", seconds_json(r, r->total_s)});
-}
-
-static cJSON *table_json(const study *s, const arguments *args, const series *all, const char *const file[2])
-{
-    cJSON *table = cJSON_CreateArray();
-    for (int e = 0; e < args->list.n_element; e++)
-        for (int k = 0; k < all[e].n; k++)
-            cJSON_AddItemToArray(table, point_json(args->list.element[e], &all[e].point[k]));
-    return PAL_JSON({"ok", JSON_BOOL(true)}, {"problem", JSON_TEXT(s->problem->name)},
-                    {"case", JSON_TEXT(s->load_case->id)},
-                    {"reference", s->reference ? JSON_TEXT(s->reference->id) : cJSON_CreateNull()},
-                    {"law", JSON_TEXT(args->solve.law)}, {"fill", JSON_BOOL(args->solve.voxel.fill)}, {"table", table},
-                    {"files", cJSON_CreateStringArray(file, file[0] ? 2 : 0)});
-}
-
-static void print_table(const study *s, const arguments *args, const series *all, const char *const file[2])
-{
-    printf("%s, load case %s, %s", s->problem->name, s->load_case->id, args->solve.law);
+    const char *name = s->reference ? s->reference->id : NULL;
+    pal_table t = {.silent = common->json || common->quiet};
+    pal_report_progress(NULL, 0, common);
+    t.root = PAL_JSON({"ok", JSON_BOOL(true)}, {"problem", JSON_TEXT(s->problem->name)},
+                      {"case", JSON_TEXT(s->load_case->id)}, {"reference", name ? JSON_TEXT(name) : cJSON_CreateNull()},
+                      {"law", JSON_TEXT(args->solve.law)}, {"fill", JSON_BOOL(args->solve.voxel.fill)});
     if (s->samples_file)
-        printf(", against %s (%d points)\n", s->reference ? s->reference->id : s->samples_file, s->samples.n);
+        pal_table_note(&t, "%s, load case %s, %s, against %s (%d points)", s->problem->name, s->load_case->id,
+                       args->solve.law, name ? name : s->samples_file, s->samples.n);
     else
-        printf(", without a reference\n");
-    printf("%-10s %10s %8s %8s %8s %6s %9s %6s %10s %9s %9s\n", "element", "resolution", "nodes", "RMS %", "max %",
-           "order", "change %", "order", "estimate %", "factor s", "total s");
+        pal_table_note(&t, "%s, load case %s, %s, without a reference", s->problem->name, s->load_case->id,
+                       args->solve.law);
+    pal_table_list(&t, "table");
     for (int e = 0; e < args->list.n_element; e++)
         for (int k = 0; k < all[e].n; k++) {
             const pal_convergence_point *p = &all[e].point[k];
-            printf("%-10s %10d %8d", args->list.element[e], p->resolution, p->result.n_node);
-            const struct {
-                int width, digits;
-                double number;
-            } cell[] = {{8, 3, p->rms_percent},     {8, 3, p->max_percent},   {6, 2, p->order},
-                        {9, 3, p->change_percent},  {6, 2, p->change_order},  {10, 3, p->estimate_percent},
-                        {9, 3, p->result.factor_s}, {9, 3, p->result.total_s}};
-            for (size_t c = 0; c < sizeof cell / sizeof cell[0]; c++)
-                if (isfinite(cell[c].number))
-                    printf(" %*.*f", cell[c].width, cell[c].digits, cell[c].number);
-                else
-                    printf(" %*s", cell[c].width, "-");
-            printf("\n");
+            const pal_solve_result *r = &p->result;
+            TABLE_ROW(&t, TEXT("element", "element", -10, args->list.element[e]),
+                      NUMBER("resolution", "resolution", 10, 0, p->resolution), VALUE("voxel_m", r->edge_m),
+                      NUMBER("nodes", "nodes", 8, 0, r->n_node), VALUE("elements", r->n_element),
+                      VALUE("dof", r->n_dof), NUMBER("rms_percent", "RMS %", 8, 3, p->rms_percent),
+                      NUMBER("max_percent", "max %", 8, 3, p->max_percent), NUMBER("order", "order", 6, 2, p->order),
+                      NUMBER("change_percent", "change %", 9, 3, p->change_percent),
+                      NUMBER("change_order", "order", 6, 2, p->change_order),
+                      NUMBER("estimate_percent", "estimate %", 10, 3, p->estimate_percent),
+                      VALUE("iterations", r->n_newton), VALUE("cg_iterations", r->n_cg),
+                      NUMBER(NULL, "factor s", 9, 3, r->factor_s), NUMBER(NULL, "total s", 9, 3, r->total_s),
+                      TREE("seconds", seconds_json(r, r->total_s)));
         }
-    for (int k = 0; k < 2 && file[k]; k++) printf("wrote %s\n", file[k]);
+    for (int k = 0; k < 2 && file[k]; k++) pal_table_note(&t, "wrote %s", file[k]);
+    return PAL_JSON_ADD(t.root, {"files", cJSON_CreateStringArray(file, file[0] ? 2 : 0)});
 }
 
 static int run_table(pal_flag_common *common, const study *s, const arguments *args)
@@ -402,8 +385,7 @@ static int run_table(pal_flag_common *common, const study *s, const arguments *a
         if (!err) err = draw(s, args, all, true, second, &diag);
         file[0] = args->plot, file[1] = second;
     }
-    int code = pal_report_end(common, err, &diag, err || !common->json ? NULL : table_json(s, args, all, file));
-    if (!err && !common->json && !common->quiet) print_table(s, args, all, file);
+    int code = pal_report_end(common, err, &diag, err ? NULL : show_table(common, s, args, all, file));
     free(all);
     return code;
 }
@@ -469,8 +451,7 @@ int command_solve(int argc, char **argv)
          "on: voxels are shifted so that their faces lie where a support, else a material, ends inside the body;\n"
          "off: they begin at the bounding box of the surface (on)"},
         {"--split", "K", PAL_FLAG_COUNT, &o->split, 1, 16,
-         "every voxel is solved as K x K x K elements of its fill: the remaining error is that of the voxel border "
-         "(1)"},
+         "every voxel is solved as K x K x K elements of its fill: what error remains is that of the voxel border (1)"},
         {"--samples", "U.csv", PAL_FLAG_TEXT, &args.samples, 0, 0,
          "compare at these points: CSV x,y,z,ux,uy,uz in m (the reference's)"},
         {"--nu", "NU", PAL_FLAG_NUMBER, &o->poisson, -1e300, 1e300, "Poisson's ratio (the problem's)"},
@@ -491,8 +472,7 @@ int command_solve(int argc, char **argv)
                                              "palpate solve deploy/problems/beam.json --case tip --resolution 8,16 "
                                              "--element hex8_bbar,tet4 --plot error.svg\n",
                                   PAL_FLAGS(flag),
-                                  .min_operand = 1,
-                                  .max_operand = 1};
+                                  .operands = {1, 1}};
     pal_flag_common common;
     int n = 0, code = pal_flags_parse(&flags, argc, argv, &common, &args.problem, &n);
     if (code >= 0) return code;

@@ -4,7 +4,7 @@
 #include "server/base/clock.h"
 #include "server/base/machine.h"
 #include "server/calibrate/journal.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/json_reader.h"
@@ -632,8 +632,7 @@ int command_study(int argc, char **argv)
                                              "--seconds 0.1 --out beam_study --pick 1 -o beam_fast\n"
                                              "palpate plan beam_fast/scene.json\n",
                                   PAL_FLAGS(flag),
-                                  .min_operand = 1,
-                                  .max_operand = 1};
+                                  .operands = {1, 1}};
     int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.request.word, &n);
     if (code >= 0) return code;
     pal_diagnostic diag = {""};

@@ -31,8 +31,6 @@ typedef struct family {
     int n_mesh;          /* solved so far */
 } family;
 
-/* ---- sizes ---- */
-
 static double nodes_of(const family *f, int size)
 {
     pal_configuration s = *f->configuration;
@@ -47,8 +45,6 @@ static int finest_size(const family *f)
     while (r >= PAL_MIN_APART * s && nodes_of(f, r) > MAX_NODES) r -= f->fits ? s : 1;
     return r >= PAL_MIN_APART * s && r <= MAX_SIZE && nodes_of(f, r) > 0 ? r : 0;
 }
-
-/* ---- equilibria ---- */
 
 static bool probe(const family *f, sized *m)
 {

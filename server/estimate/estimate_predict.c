@@ -86,8 +86,6 @@ void pal_estimate_probe_cost(const pal_scene *scene, pal_world *live, pal_world 
     out->work[1] = known ? grown(report, n_cg, along, out->nodes[1], ms[1]) : out->nodes[1];
 }
 
-/* ---- neighbours ---- */
-
 /* nodes, substeps: relative to the present */
 static void add(const pal_prediction *from, pal_estimate *out, const pal_configuration *configuration, double ms,
                 double change_m, double nodes, double substeps)

@@ -172,16 +172,6 @@ static pal_err merge(pal_rest_solution *r, const pal_prepared *mesh, pal_diagnos
 
 /* ---- positions of the running body's nodes ---- */
 
-static void shape_functions(const pal_body *b, const double local[4], double *shape)
-{
-    if (b->n_corner == PAL_HEX_CORNERS)
-        pal_hex_shape(local, shape, NULL);
-    else if (b->n_corner == PAL_TET10_CORNERS)
-        pal_tet10_shape(local, shape, NULL);
-    else
-        memcpy(shape, local, 4 * sizeof *shape);
-}
-
 /* moves outside points to the nearest inside one: extrapolation would turn a load into a pair of large opposite
  * ones */
 static void take_inside(const pal_body *b, double local[4])
@@ -209,7 +199,7 @@ pal_err pal_rest_solution_interpolation(const pal_rest_solution *r, const double
         int e = pal_locate_point(locate, x + 3 * (size_t)i * (size_t)stride, local, NULL);
         const int32_t *node = own->element + (size_t)own->n_corner * (size_t)e;
         if (inside) take_inside(own, local);
-        shape_functions(own, local, shape);
+        pal_element_shape(own->n_corner, local, shape);
         for (int k = 0; k < own->n_corner; k++) pal_interpolation_builder_add(&rows, node[k], shape[k]);
         pal_interpolation_builder_end_row(&rows);
     }

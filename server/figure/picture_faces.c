@@ -8,7 +8,6 @@
 enum { DIVIDE_MAX = 8, CLASSES_A_PIECE = 2 };
 static const double crease_cosine = 0.8; /* sharper than 37 degrees */
 
-/* an edge: its n sides in triangles */
 typedef struct edge {
     const pal_surface_side *side;
     int n;
@@ -51,8 +50,6 @@ static int count_seen(const pal_picture_mesh *m, const pal_picture_axes *axes)
     }
     return n;
 }
-
-/* ---- fewer triangles ---- */
 
 typedef struct cell {
     uint64_t key;
@@ -138,8 +135,6 @@ pal_err pal_picture_mesh_prepare(pal_picture_mesh *m, const pal_picture_axes *ax
     }
     return PAL_ERR_OK;
 }
-
-/* ---- pieces ---- */
 
 typedef struct face {
     double p[3][3]; /* projected corners */

@@ -132,8 +132,6 @@ static void draw_curve(FILE *to, const pal_plot *plot, int k, const axis *x, con
     pal_svg_text(to, from + 36, at + 4, "start", "", c->name, 0);
 }
 
-/* ---- guides and labels ---- */
-
 typedef struct box {
     double low[2], high[2];
 } box;

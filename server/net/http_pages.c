@@ -61,7 +61,6 @@ static void get_sessions(pal_hub *hub, pal_reply *reply)
     free(text);
 }
 
-/* one line of /metrics */
 typedef struct metric {
     const char *name;  /* without the prefix palpate_; a counter's ends in _total. NULL: as the line before */
     const char *about; /* help */

@@ -12,8 +12,6 @@
 #include <stdio.h>
 #include <string.h>
 
-/* ---- the study ---- */
-
 /* points of one method form one curve: "fem hex8_bbar", "tet_springs calibrated" */
 static void method_text(const pal_configuration *s, char out[PAL_WIRE_METHOD_BYTES])
 {
@@ -47,8 +45,6 @@ static void send_study(pal_client *c, int body)
     }
     pal_hub_send(c);
 }
-
-/* ---- position in the study ---- */
 
 /* Similarity of a study configuration to the current one: the number of values that it specifies, -1 if one differs.
  * An unspecified word or number matches anything. */
@@ -85,8 +81,6 @@ static double point_of(const pal_hub_room *room, int body, const pal_configurati
     }
     return best < 0 ? NAN : (double)best;
 }
-
-/* ---- displayed errors ---- */
 
 static double error_of(const pal_hub_room *room, double point)
 {
@@ -125,8 +119,6 @@ void pal_hub_shown_errors(const pal_hub_room *room, int body, int point, const p
         if (is_neighbour(&e.neighbour[i].configuration, to)) *then_m = e.neighbour[i].error_m;
     if (!isfinite(*then_m)) *then_m = error_of(room, point < 0 ? point_of(room, body, to) : (double)point);
 }
-
-/* ---- the estimate ---- */
 
 static double known(double value)
 {

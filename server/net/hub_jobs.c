@@ -36,8 +36,6 @@ struct pal_hub_jobs {
     bool leaving;
 };
 
-/* ---- the background thread ---- */
-
 static void make(pal_job *job)
 {
     const pal_scene *scene = NULL;
@@ -154,8 +152,6 @@ void pal_hub_jobs_end(pal_hub *hub)
     free(s);
     hub->jobs = NULL;
 }
-
-/* ---- the queue and the results ---- */
 
 /* NULL: has left */
 static pal_client *requester(const pending_job *w)

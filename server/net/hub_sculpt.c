@@ -8,7 +8,6 @@
 #include "server/net/tuning.h"
 #include "server/sim/world/pick.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -74,8 +73,6 @@ static double *points_now(const pal_hub_room *room, int body, int *n)
     if (out) memcpy(out, frame->part[body].point_m, 3 * sizeof *out * (size_t)*n);
     return out;
 }
-
-/* ---- edits ---- */
 
 /* builds a cell edit from the picked points; false: an error was sent */
 static bool read_cells(pal_client *c, int kind, const pal_wire_command *command, pal_job *job)
@@ -195,8 +192,6 @@ bool pal_hub_run_edit(pal_client *c, const pal_verb *verb, const pal_wire_comman
     (void)verb;
     return find_body(c, command) >= 0 && pal_hub_jobs_enqueue(c, &edit_job, command);
 }
-
-/* ---- immediate commands ---- */
 
 bool pal_hub_run_probe(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {

@@ -5,6 +5,8 @@
  * 5) / 20, b = (5 - sqrt 5) / 20; triangle of degree 4 with 6 points (Dunavant 1985). */
 #include "server/num/shape_functions.h"
 
+#include <stddef.h>
+
 #define G 0.57735026918962576451
 #define A 0.58541019662496845446
 #define B 0.13819660112501051518
@@ -49,4 +51,14 @@ void pal_tet10_shape(const double l[4], double n[10], double g[10][3])
         if (!g) continue;
         for (int k = 0; k < 3; k++) g[4 + e][k] = 4 * (l[a] * dl[b][k] + l[b] * dl[a][k]);
     }
+}
+
+void pal_element_shape(int n_corner, const double local[4], double *n)
+{
+    if (n_corner == PAL_HEX_CORNERS)
+        pal_hex_shape(local, n, NULL);
+    else if (n_corner == PAL_TET10_CORNERS)
+        pal_tet10_shape(local, n, NULL);
+    else
+        for (int k = 0; k < PAL_TET_CORNERS; k++) n[k] = local[k];
 }

@@ -13,6 +13,9 @@ void pal_hex_shape(const double x[3], double n[8], double g[8][3]);
 /* the same at barycentric l [4]; gradients are with respect to l[1], l[2], l[3], l[0] = 1 - their sum */
 void pal_tet10_shape(const double l[4], double n[10], double g[10][3]);
 
+/* values n [n_corner] of the element with 8, 10 or 4 corners; local: x of the hexahedron, else barycentric */
+void pal_element_shape(int n_corner, const double local[4], double *n);
+
 /* Gauss points of the hexahedron (2x2x2, weight 1 each) and of the tetrahedron (4 points, weight 1/4 of the volume,
  * exact to degree 2) */
 extern const double pal_hex_gauss[8][3];

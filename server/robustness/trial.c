@@ -1,8 +1,8 @@
 /* Runs a robustness case: rest, monitored steps, return to rest, verdict. */
 #include "server/robustness/trial.h"
 #include "server/base/vec3.h"
-#include "server/num/polar.h"
 #include "server/num/random.h"
+#include "server/sim/core/best_rotation.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -43,7 +43,7 @@ static double body_deviation_S(const pal_trial *trial, int body_index)
     const double *rest = trial->rest[body_index];
     /* points present in every state of the body: of an adaptive one those of its coarsest level */
     const int n = body->active ? body->dofs.levels->n_vertex[0] : body->n_dof;
-    double c[3] = {0, 0, 0}, o[3] = {0, 0, 0}, f[9] = {0}, q[4] = {1, 0, 0, 0}, r[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    double c[3] = {0, 0, 0}, o[3] = {0, 0, 0}, pairs[9], r[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     double sum = 0;
     bool free = true;
     for (int i = 0; i < body->n_dof; i++) free = free && !body->support[i];
@@ -51,13 +51,9 @@ static double body_deviation_S(const pal_trial *trial, int body_index)
         pal_axpy3(c, 1.0 / n, body->x + 3 * (size_t)i);
         pal_axpy3(o, 1.0 / n, rest + 3 * (size_t)i);
     }
-    for (int i = 0; i < n && free; i++)
-        for (int a = 0; a < 3; a++)
-            for (int b = 0; b < 3; b++)
-                f[3 * a + b] += (body->x[3 * (size_t)i + (size_t)a] - c[a]) * (rest[3 * (size_t)i + (size_t)b] - o[b]);
     if (free) {
-        pal_polar_rotation(f, q, 100);
-        pal_quat_matrix(q, r);
+        pal_sum_pairs(n, NULL, body->x, rest, pairs);
+        pal_best_rotation(pairs, r);
     }
     for (int i = 0; i < n; i++) {
         double from[3], to[3];

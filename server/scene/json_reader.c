@@ -1,9 +1,8 @@
 /* The tree is cJSON's; what it does not check is checked here: depth, UTF-8, duplicate keys, bytes behind the root. */
 #include "server/scene/json_reader.h"
 
-#include "server/mesh/files/file_bytes.h"
-
 #include "server/base/utf8.h"
+#include "server/mesh/files/file_bytes.h"
 
 #include <math.h>
 #include <stdarg.h>

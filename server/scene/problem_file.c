@@ -3,7 +3,6 @@
 #include "server/scene/problem_file.h"
 
 #include "server/base/vec3.h"
-#include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/json_reader.h"
 #include "server/scene/tuning.h"
@@ -43,7 +42,6 @@ static pal_err check_numbers(const pal_json *at, const char *const *keys)
     return PAL_ERR_OK;
 }
 
-/* one of a NULL-terminated list of words */
 static pal_err read_word(const pal_json *at, const char *key, const char *const *words, char *out, size_t n_byte)
 {
     char list[160];
@@ -89,10 +87,7 @@ static pal_err read_region(const pal_json *parent, pal_box *out)
     }
     PAL_TRY(read_vector(at, "min", PAL_LENGTH_MAX_M, out->low_m));
     PAL_TRY(read_vector(at, "max", PAL_LENGTH_MAX_M, out->high_m));
-    for (int c = 0; c < 3; c++)
-        if (out->low_m[c] > out->high_m[c])
-            return pal_json_refuse(at, "min[%d] %g is above max[%d] %g", c, out->low_m[c], c, out->high_m[c]);
-    return PAL_ERR_OK;
+    return pal_json_box(at, "min", "max", out->low_m, out->high_m);
 }
 
 static pal_err read_material(const pal_json *at, pal_problem *out, int index)

@@ -92,22 +92,6 @@ static pal_err read_grid(const pal_json *region, pal_region *out, double **own)
     return read_values(&at, &material_values, out->n, *own, value);
 }
 
-/* inverse of the left 3x3 of to_m, row-major; false: the voxels have no volume */
-static bool invert(const double to_m[12], double out[9])
-{
-    double det = 0, size = 0;
-    for (int r = 0; r < 3; r++)
-        for (int c = 0; c < 3; c++) {
-            int r1 = (c + 1) % 3, r2 = (c + 2) % 3, c1 = (r + 1) % 3, c2 = (r + 2) % 3;
-            out[3 * r + c] = to_m[4 * r1 + c1] * to_m[4 * r2 + c2] - to_m[4 * r1 + c2] * to_m[4 * r2 + c1];
-        }
-    for (int c = 0; c < 3; c++) det += to_m[c] * out[3 * c];
-    for (int k = 0; k < 9; k++) size = fmax(size, fabs(out[k]));
-    if (!(fabs(det) > 0) || !isfinite(size / det)) return false;
-    for (int k = 0; k < 9; k++) out[k] /= det;
-    return true;
-}
-
 /* the axes' grid of a volume: its spacing, count and first point in the file's frame */
 static void make_grid(const pal_label_volume *v, pal_region *out)
 {
@@ -138,10 +122,13 @@ static void make_grid(const pal_label_volume *v, pal_region *out)
 static pal_err sample(const pal_json *at, const pal_label_volume *v, int is, const double origin[3], pal_region *out,
                       uint8_t **own)
 {
-    double from_m[9];
+    double axes[9], from_m[9];
     int64_t found = 0;
     make_grid(v, out);
-    if (!invert(v->to_m, from_m)) return pal_json_refuse(at, "the voxels of the volume have no size");
+    for (int k = 0; k < 9; k++) axes[k] = v->to_m[4 * (k / 3) + k % 3];
+    (void)pal_inverse33(from_m, axes);
+    if (!pal_finite3(from_m) || !pal_finite3(from_m + 3) || !pal_finite3(from_m + 6))
+        return pal_json_refuse(at, "the voxels of the volume have no size");
     double count = (double)out->n[0] * out->n[1] * out->n[2];
     for (int c = 0; c < 3; c++)
         if (out->n[c] > 32767) return pal_json_refuse(at, "%d voxels on an axis, more than 32767", out->n[c]);

@@ -2,7 +2,7 @@
  * of paper C (Table I, Figs. 8-13) with what holds them. */
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/decimate.h"
-#include "server/mesh/geometry/stomach.h"
+#include "server/mesh/geometry/procedural.h"
 #include "server/scene/scene_import.h"
 #include "server/scene/tuning.h"
 

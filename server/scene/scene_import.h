@@ -15,8 +15,9 @@ pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *option
 pal_err pal_scene_from_cells(const char *path, const pal_surface_scene *options, pal_loaded_scene **out,
                              pal_diagnostic *diag);
 /* our own procedural organ as a scene, for when nothing else can be had; or the shapes of
- * server/mesh/geometry/stomach.h: a stomach held at the ends of oesophagus and duodenum, a sphere of radius 0.05 m on
- * anchors fixed in space, a sheet of 17 x 17 vertices and 0.2 m held at its border. REFUSED: there is no such shape */
+ * server/mesh/geometry/procedural.h: a stomach held at the ends of oesophagus and duodenum, a sphere of radius 0.05 m
+ * on anchors fixed in space, a sheet of 17 x 17 vertices and 0.2 m held at its border. REFUSED: there is no such shape
+ */
 pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene **out, pal_surface_scene_report *report,
                              pal_diagnostic *diag);
 /* an organ of server/mesh/geometry/organ_family.h by its name FAMILY:SEED, which gives resolution, modulus, support and
@@ -51,7 +52,7 @@ pal_err pal_scene_adaptive_inspect(const pal_surface *surface, const pal_surface
 /* model, output and supports of a body with defaults */
 pal_err pal_scene_adaptive_defaults(pal_body_def *body, const pal_surface_scene *options,
                                     const pal_surface_scene_report *report, pal_diagnostic *diag);
-/* a shape of mesh/geometry/stomach.h by name, its box's middle at zero, and how it is held; up where it has one */
+/* a shape of mesh/geometry/procedural.h by name, its box's middle at zero, and how it is held; up where it has one */
 typedef struct pal_scene_shape {
     const char *name, *title;
     pal_surface surface;

@@ -9,7 +9,6 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
@@ -27,8 +26,6 @@ struct pal_input_log {
     _Atomic bool stop, failed;
     uint64_t n_dropped;
 };
-
-/* ---- bytes ---- */
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "logs are written in the host's order");
 
@@ -199,8 +196,6 @@ uint64_t pal_scene_fingerprint(const pal_scene *scene)
     return h;
 }
 
-/* ---- writer ---- */
-
 static bool write_all(int file, const uint8_t *bytes, size_t n)
 {
     while (n > 0) {
@@ -325,8 +320,6 @@ pal_err pal_input_log_close(pal_input_log *log, uint64_t step, uint64_t hash)
     free(log);
     return good ? PAL_ERR_OK : PAL_ERR_IO;
 }
-
-/* ---- reader ---- */
 
 pal_err pal_input_get_header(const char *name, const uint8_t *bytes, size_t n_byte, pal_input_header *out, size_t *at,
                              pal_diagnostic *diag)

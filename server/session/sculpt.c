@@ -45,8 +45,6 @@ struct pal_sculpt_edit {
     pal_prepared mesh;
 };
 
-/* ---- shapes ---- */
-
 static void free_shape(shape *s)
 {
     pal_cells_free(&s->cells);
@@ -128,8 +126,6 @@ int pal_sculptor_redo_count(const pal_sculptor *sculptor)
     return sculptor->n_future;
 }
 
-/* ---- commands ---- */
-
 static pal_err paint(const pal_sculptor *s, const pal_stroke *stroke, shape *to, pal_diagnostic *diag)
 {
     PAL_TRY(pal_stroke_check(stroke, diag));
@@ -209,8 +205,6 @@ static pal_err execute(const pal_sculptor *s, const pal_sculpt *command, pal_scu
     return PAL_REFUSE(diag, "there is no sculpting command %d", (int)command->kind);
 }
 
-/* ---- edits ---- */
-
 /* builds the scene with the body's new shape; the edit owns all that the body borrows */
 static pal_err make_scene(const pal_sculptor *s, const pal_scene *scene, pal_sculpt_edit *edit)
 {
@@ -248,10 +242,7 @@ pal_err pal_sculptor_prepare(const pal_sculptor *sculptor, const pal_scene *scen
     const pal_sculptor *s = sculptor;
     pal_sculpt_edit *edit = calloc(1, sizeof *edit);
     if (!edit) return PAL_ERR_MEMORY;
-    edit->kind = command->kind;
-    edit->from = &s->now.cells;
-    edit->body = s->body;
-    edit->cut = s->cut;
+    *edit = (pal_sculpt_edit){.kind = command->kind, .from = &s->now.cells, .body = s->body, .cut = s->cut};
     pal_err err = execute(s, command, edit, diag);
     if (!err) err = make_room(s, edit);
     if (!err) err = make_scene(s, scene, edit);
@@ -326,8 +317,6 @@ void pal_sculpt_edit_free(pal_sculpt_edit *edit)
     pal_prepared_free(&edit->mesh);
     free(edit);
 }
-
-/* ---- picking ---- */
 
 static double off_edge(const pal_cells *c, int32_t edge, const double at[3])
 {

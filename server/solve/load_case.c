@@ -13,11 +13,10 @@
 #include "server/base/vec3.h"
 #include "server/mesh/volume/loose_components.h"
 #include "server/num/shape_functions.h"
-#include "server/solve/tuning.h"
+#include "server/sim/core/configuration.h"
 
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 pal_box_text pal_box_describe(const pal_box *box)
 {
@@ -80,14 +79,6 @@ static void align(const pal_problem *p, int resolution, const pal_surface *surfa
     }
 }
 
-/* share of the surface's volume that the filled voxels lack */
-static double missing(const pal_prepared *mesh)
-{
-    double sum = 0, cube = mesh->tets.edge_m * mesh->tets.edge_m * mesh->tets.edge_m;
-    for (int e = 0; e < mesh->hexes.n_hex; e++) sum += cube * (double)mesh->hexes.fill[e];
-    return 1 - sum / fabs(pal_surface_volume(&mesh->surface));
-}
-
 /* drops components without a support, as in the preparation of a scene (mesh/volume/loose_components.h) */
 static pal_err drop_loose(const pal_problem *p, pal_prepared *mesh, pal_diagnostic *diag)
 {
@@ -111,13 +102,11 @@ pal_err pal_case_voxels(const pal_problem *problem, const pal_surface *surface, 
 {
     pal_voxel_options voxel = {.resolution = how->resolution, .border = true, .min_fill = how->min_fill};
     pal_prepare_report report;
-    bool chosen = !(how->min_fill > 0);
-    if (chosen) voxel.min_fill = how->fill ? PAL_DROP_FILL : 0.5;
     if (how->align) align(problem, how->resolution, surface, voxel.ahead);
-    PAL_TRY(pal_prepared_make(surface, &voxel, out, &report, diag));
-    if (chosen && how->fill && missing(out) > PAL_MAX_MISSING) {
-        pal_prepared_free(out);
-        voxel.min_fill = PAL_KEEP_FILL;
+    if (how->fill && !(how->min_fill > 0)) {
+        PAL_TRY(pal_filled_voxels_make(surface, &voxel, out, &report, diag));
+    } else {
+        if (!(how->min_fill > 0)) voxel.min_fill = 0.5;
         PAL_TRY(pal_prepared_make(surface, &voxel, out, &report, diag));
     }
     if (report.voxel.n_component == 1) return PAL_ERR_OK;
@@ -154,16 +143,10 @@ int pal_case_shape_functions(const pal_body *body, int element, const double loc
 {
     int n_corner = body->element ? body->n_corner : PAL_TET_CORNERS;
     *node = (body->element ? body->element : body->tets->tet) + (size_t)n_corner * (size_t)element;
-    if (n_corner == PAL_HEX_CORNERS)
-        pal_hex_shape(local, shape, NULL);
-    else if (n_corner == PAL_TET10_CORNERS)
-        pal_tet10_shape(local, shape, NULL);
-    else
-        memcpy(shape, local, 4 * sizeof *shape);
+    pal_element_shape(n_corner, local, shape);
     return n_corner;
 }
 
-/* one load being applied to the nodes */
 typedef struct job {
     const pal_problem *problem;
     const pal_problem_case *load_case;

@@ -25,7 +25,6 @@ struct pal_solution {
     bool hex;
 };
 
-/* input of every function of one solve */
 typedef struct job {
     const pal_problem *problem;
     const pal_problem_case *load_case;

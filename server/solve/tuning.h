@@ -1,4 +1,4 @@
-/* Tuning constants of solve: limits of what preflight calls weak, and which cut voxels are kept. */
+/* Tuning constants of solve: limits of what preflight calls weak. */
 #ifndef PAL_SOLVE_TUNING_H
 #define PAL_SOLVE_TUNING_H
 
@@ -14,9 +14,4 @@
 /* s: time constant of a body's return above which it is said to be slow: longer than a user waits for tissue to come
  * back (tests/solve/test_preflight.c) */
 #define PAL_SLOW_RETURN_S 10
-/* fill below which cut voxels are dropped, and the volume that may be lost by it; fill otherwise (load_case.c gives
- * the measurements; tests/solve/test_solve.c) */
-#define PAL_DROP_FILL   0.25
-#define PAL_MAX_MISSING 0.025
-#define PAL_KEEP_FILL   0.02
 #endif

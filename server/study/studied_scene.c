@@ -88,8 +88,6 @@ void pal_study_describe_miss(const pal_study *study, const char *methods, const 
                  best->measured.ms);
 }
 
-/* ---- a scene and its study ---- */
-
 /* Reads and checks a study. *out NULL and OK: there is none. The diagnostic is about the study. */
 static pal_err find(const char *path, const pal_scene *scene, pal_study_file **out, pal_diagnostic *diag)
 {

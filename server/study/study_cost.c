@@ -144,8 +144,6 @@ static cost_law best_fit(const seen *p, int n)
     return best;
 }
 
-/* ---- counts ---- */
-
 static bool is_adaptive(const pal_configuration *s)
 {
     return pal_study_is(s->model, "adaptive_springs") && !pal_study_is(s->element, "refined") && s->size > 1;
@@ -205,8 +203,6 @@ static double nodes_in_use(const pal_study *study, int leave_out, const pal_conf
     }
     return n > 0 ? coarse + share / n * (refined_nodes(study, leave_out, s, coarse) - coarse) : (double)NAN;
 }
-
-/* ---- predicted ---- */
 
 static bool has_words(const seen *p, int n, const pal_configuration *s)
 {

@@ -82,8 +82,6 @@ void pal_study_input_close(pal_study_input *input)
     *input = (pal_study_input){0};
 }
 
-/* ---- identity of the study ---- */
-
 void pal_study_loads_read(const char *loads, double *seconds, bool *quick, char load_case[PAL_NAME])
 {
     static const char named[] = "load case ";

@@ -24,8 +24,6 @@ bool pal_study_continues(const pal_study_job *job)
     return !job->options->may_continue || job->options->may_continue(job->options->user);
 }
 
-/* ---- probes ---- */
-
 static pal_err allocate(pal_study_job *job, int n_probe)
 {
     pal_err err = PAL_ERR_OK;
@@ -63,8 +61,6 @@ static pal_err choose_probes(pal_study_job *job)
     pal_study_close(&w);
     return err;
 }
-
-/* ---- the sweep ---- */
 
 /* the point if it was measured before */
 static const pal_study_point *known(const pal_study *before, const pal_study_entry *entry)
@@ -143,8 +139,6 @@ static pal_err study(pal_study_job *job)
     return err;
 }
 
-/* ---- from a scene ---- */
-
 /* Every mesh of the study has the same supports. Calibration accepts boxes only. */
 static void set_supports(pal_study_job *job)
 {
@@ -213,8 +207,6 @@ pal_err pal_study_scene(const pal_scene *scene, const pal_study_options *options
     free_job(&job);
     return err;
 }
-
-/* ---- from a problem ---- */
 
 /* the first material is the body's own, all others are regions */
 static pal_err set_materials(const pal_problem *p, const double origin[3], pal_body_def *body, pal_diagnostic *diag)

@@ -149,7 +149,6 @@ static double usual_tolerance(const pal_study *study)
     return usual;
 }
 
-/* what the plot of a study borrows */
 typedef struct series {
     char name[METHODS][PAL_CONFIGURATION_TEXT];
     int n_method, n[METHODS], n_front;

@@ -66,8 +66,6 @@ int pal_study_pick(const pal_study *study, const char *methods, double max_error
     return best;
 }
 
-/* ---- along the sizes ---- */
-
 static double edges(const pal_configuration *s)
 {
     if (pal_study_is(s->model, "subdivision_fem")) return exp2(s->size > 0 ? s->size : 0);
@@ -122,8 +120,6 @@ static along find_law(const pal_study *study, const pal_configuration *s, int le
     out.off = sqrt(out.off);
     return out;
 }
-
-/* ---- all parameters of a model ---- */
 
 static void features(const pal_configuration *s, double f[FEATURES])
 {

@@ -27,8 +27,6 @@ static pal_configuration reference_configuration(const pal_study_job *job, int s
     return s;
 }
 
-/* ---- cache ---- */
-
 /* includes the terminators, so that words do not run together */
 static uint64_t add_word(uint64_t sum, const char *word)
 {
@@ -77,8 +75,6 @@ pal_err pal_study_cached_static(pal_study_job *job, const pal_configuration *con
 {
     return cached(job, configuration, load, (double(*)[3])u, job->n_probe, n_node, diag);
 }
-
-/* ---- size ---- */
 
 /* longest over shortest side, a quarter of it, 1 to 3; the sides of a box-shaped body */
 static void take_sides(pal_study_job *job, const pal_surface *surface)

@@ -13,8 +13,6 @@
 
 enum { MAX_NEWTON = 120, MAX_RELAX = 4000, QUIET = 3, RAMPS = 4 };
 
-/* ---- finite elements ---- */
-
 static pal_err converge(const pal_study_job *job, pal_study_world *w, pal_diagnostic *diag)
 {
     int n_newton = 0;
@@ -56,8 +54,6 @@ static pal_err newton(pal_study_job *job, const pal_configuration *configuration
     pal_study_close(&w);
     return err;
 }
-
-/* ---- springs ---- */
 
 typedef struct springs {
     pal_lattice lattice;
@@ -146,8 +142,6 @@ static pal_err lattice(pal_study_job *job, const pal_configuration *configuratio
     pal_study_close(&w);
     return err;
 }
-
-/* ---- by running ---- */
 
 /* steps until several successive peaks show no significant change */
 static pal_err relax_world(pal_study_job *job, pal_study_world *w, int max_step, double *before, double *u,

@@ -13,8 +13,6 @@
 
 enum { MAX_TIMES = 1200, WARM = 3, MIN_TIMES = 30, ROUNDS = 2 };
 
-/* ---- at rest ---- */
-
 static bool same_rest(const pal_configuration *a, const pal_configuration *b)
 {
     pal_configuration p = *a, q = *b;
@@ -40,8 +38,6 @@ static void find_rest(pal_study_job *job, const pal_configuration *configuration
     r->rms_m = sqrt(sum / (job->n_probe * job->n_load));
     if (r->err) snprintf(r->reason, sizeof r->reason, "%.*s", PAL_CONFIGURATION_TEXT - 1, reason.text);
 }
-
-/* ---- in motion ---- */
 
 /* one timed step; an error: it cannot continue */
 static pal_err timed_step(pal_study_world *w, double *ms, int max, int *n_ms, pal_diagnostic *diag)
@@ -152,8 +148,6 @@ static void compare_trajectories(const pal_study_job *job, pal_study_point *out)
     }
     out->trajectory_rms_m = sqrt(sum / job->n_trajectory);
 }
-
-/* ---- both ---- */
 
 /* times the trajectory; keeps the result if it is the first or the fastest */
 static pal_err time_trajectory(pal_study_job *job, pal_study_point *out, double (*trajectory)[3], pal_diagnostic *diag)

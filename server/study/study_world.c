@@ -63,8 +63,6 @@ pal_err pal_study_open(const pal_study_job *job, const pal_configuration *config
     return err;
 }
 
-/* ---- loads ---- */
-
 static int32_t node_of(const pal_study_world *w, int vertex)
 {
     return w->node ? w->node[vertex] : vertex;
@@ -162,8 +160,6 @@ pal_err pal_study_apply_load(const pal_study_job *job, const pal_study_world *w,
     free(f);
     return err;
 }
-
-/* ---- points ---- */
 
 static void node_displacement_m(const pal_body *b, int node, double share, double u[3])
 {

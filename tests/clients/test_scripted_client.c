@@ -1,12 +1,12 @@
 /* What the client programs are made of and needs no server: addresses, flags, scripts, samples. */
 #include "clients/link/asset_store.h"
-#include "clients/link/client_flags.h"
 #include "clients/link/end_condition.h"
 #include "clients/link/link.h"
 #include "clients/scripted_client/orders.h"
 #include "clients/scripted_client/samples.h"
 #include "clients/scripted_client/script.h"
 #include "clients/scripted_client/scripted_client.h"
+#include "server/base/flags.h"
 #include "tests/check.h"
 
 #include <pthread.h>
@@ -95,17 +95,18 @@ static void flags_are_taken_from_the_table_and_the_rest_refused(void)
     bool loud = false;
     double rate = 5;
     const char *name = "x", *stall = NULL, *operand[1] = {NULL};
-    const pal_client_flag flag[] = {{"--loud", NULL, &loud, 0, 0, NULL, ""},
-                                    {"--rate", "HZ", &rate, 1, 100, NULL, ""},
-                                    {"--name", "N", &name, 0, 0, NULL, ""},
-                                    {"--stall", "S", &stall, 0, 0, "3", ""}};
-    const pal_client_table table = {"test", "URL", "", flag, 4, 1, 1};
+    pal_flag_common common;
+    const pal_flag flag[] = {{"--loud", NULL, PAL_FLAG_SWITCH, &loud, 0, 0, ""},
+                             {"--rate", "HZ", PAL_FLAG_NUMBER, &rate, 1, 100, ""},
+                             {"--name", "N", PAL_FLAG_TEXT, &name, 0, 0, ""},
+                             {"--stall", "S", PAL_FLAG_OPTIONAL, &stall, 0, 0, ""}};
+    const pal_flag_table table = {.program = "test", .usage = "URL", .about = "", PAL_FLAGS(flag), .operands = {1, 1}};
     char *good[] = {"test", "--rate=7", "url", "--stall", "--loud", "--name", "Ada"};
-    CHECK_INT(pal_client_flags_parse(&table, 7, good, operand), -1);
+    CHECK_INT(pal_flags_parse(&table, 7, good, &common, operand, NULL), -1);
     CHECK(loud && rate == 7);
     CHECK_TEXT(operand[0], "url");
     CHECK_TEXT(name, "Ada");
-    CHECK_TEXT(stall, "3");
+    CHECK_TEXT(stall, "");
     char *const bad[][3] = {{"test", "url", "--rat"},    {"test", "url", "--rate=0"}, {"test", "url", "--rate=x"},
                             {"test", "url", "--loud=1"}, {"test", "url", "url2"},     {"test", "--loud", "--loud"},
                             {"test", "url", "--name"}};
@@ -113,12 +114,8 @@ static void flags_are_taken_from_the_table_and_the_rest_refused(void)
     CHECK(quiet != NULL);
     for (int i = 0; i < 7; i++) {
         char *words[3] = {bad[i][0], bad[i][1], bad[i][2]};
-        CHECK_INT(pal_client_flags_parse(&table, 3, words, operand), 2);
+        CHECK_INT(pal_flags_parse(&table, 3, words, &common, operand, NULL), 2);
     }
-    double triple[3];
-    CHECK(pal_client_parse_vector("1,-2,3e-1", triple) && triple[1] == -2 && triple[2] == 0.3);
-    CHECK(!pal_client_parse_vector("1,2", triple) && !pal_client_parse_vector("1,2,3,4", triple) &&
-          !pal_client_parse_vector("1,2,nan", triple));
 }
 
 static void scripts_go_through_their_points_and_repeat(void)

@@ -108,11 +108,11 @@ for (const file of files) {
     if (!own_state.test(file))
         for (const [read] of text.matchAll(/(?:->|\.)model\.(?:adaptive|solid)\b/g))
             fault(file, `reads ${read}: others than the model read body->dofs`);
-    // a room reports by its results and by log; only commands print and exit (err.c: a failed assertion)
+    // a room reports by its results and by log; only commands print and exit (err.c: a failed assertion; flags.c: the manual)
     const quiet =
         room.startsWith("server/") &&
         !/^server\/(commands|bench|cli)$/.test(room) &&
-        !/^server\/base\/(err|log)\.c$/.test(file);
+        !/^server\/base\/(err|log|flags)\.c$/.test(file);
     const prints = text.match(/(?<!\w)(?:printf|puts|putchar|perror|_?exit|abort)\(|fprintf\(std(?:out|err)\b/);
     if (quiet && prints) fault(file, `${prints[0]}: a room below commands neither prints nor exits`);
     const lines = text.split("\n").length - 1;

@@ -1,6 +1,6 @@
 /* Flags and configuration: what each source may say, which one wins, and what is refused with which words. */
 #include "server/cli/config.h"
-#include "server/cli/flags.h"
+#include "server/cli/report.h"
 #include "tests/check.h"
 
 #include <fcntl.h>
@@ -9,6 +9,7 @@ static double number;
 static int count;
 static bool on;
 static const char *text;
+static double vector[3];
 static pal_config config;
 static pal_flag_common common;
 static const char *operand[2];
@@ -21,9 +22,9 @@ static int parse(bool with_config, char **word)
     const pal_flag flag[] = {{"--number", "X", PAL_FLAG_NUMBER, &number, -2, 5, "a number"},
                              {"--count", "N", PAL_FLAG_COUNT, &count, 1, 9, "a count"},
                              {"--on", NULL, PAL_FLAG_SWITCH, &on, 0, 0, "a switch"},
+                             {"--vector", "X,Y,Z", PAL_FLAG_VECTOR, vector, 0, 0, "three numbers"},
                              {"-o", "TEXT", PAL_FLAG_TEXT, &text, 0, 0, "a text"}};
-    const pal_flag_table table = {
-        .usage = "try", .about = "", PAL_FLAGS(flag), .max_operand = 2, .config = with_config ? &config : NULL};
+    const pal_flag_table table = {.usage = "try", .about = "", PAL_FLAGS(flag), .operands = {0, 2}};
     int argc = 0;
     while (word[argc]) argc++;
     number = 1, count = 2, on = false, text = NULL, n_operand = 0;
@@ -32,7 +33,8 @@ static int parse(bool with_config, char **word)
     if (!file || old < 0) return -100;
     fflush(stderr);
     dup2(fileno(file), STDERR_FILENO);
-    int code = pal_flags_parse(&table, argc, word, &common, operand, &n_operand);
+    int code = with_config ? pal_config_parse_flags(&table, &config, argc, word, &common, operand, &n_operand)
+                           : pal_flags_parse(&table, argc, word, &common, operand, &n_operand);
     fflush(stderr);
     dup2(old, STDERR_FILENO);
     close(old);
@@ -60,13 +62,15 @@ static void values_may_stand_apart_or_behind_an_equal_sign(void)
     CHECK_TEXT(text, "-dash");
     CHECK_INT(n_operand, 2);
     CHECK_TEXT(operand[1], "b");
-    CHECK_TEXT(common.command, "try");
+    CHECK_TEXT(common.program, "palpate try");
     CHECK_TEXT(output, "");
     CHECK_INT(PARSE("--quiet", "--", "--on", "-"), -1);
     CHECK(!on && common.quiet);
     CHECK_TEXT(operand[0], "--on");
     CHECK_INT(PARSE("-"), -1);
     CHECK_INT(n_operand, 1);
+    CHECK_INT(PARSE("--vector", "1,-2,3e-1"), -1);
+    CHECK(vector[0] == 1 && vector[1] == -2 && vector[2] == 0.3);
     CHECK_INT(PARSE("-o="), -1);
     CHECK_TEXT(text, "");
 }
@@ -83,6 +87,9 @@ static void what_is_wrong_is_said_in_one_line_with_the_flag_and_the_range(void)
     WRONG(PARSE("--count", "1.5"), "1.5 is not a whole number");
     WRONG(PARSE("--count", "99999999999"), "--count: 99999999999 is outside 1 .. 9");
     WRONG(PARSE("--count"), "--count needs a value");
+    WRONG(PARSE("--vector", "1,2"), "--vector: \"1,2\" is not three numbers X,Y,Z");
+    WRONG(PARSE("--vector", "1,2,3,4"), "is not three numbers");
+    WRONG(PARSE("--vector=1,2,nan"), "is not three numbers");
     WRONG(PARSE("--on=1"), "--on takes no value");
     WRONG(PARSE("--on", "--on"), "--on is given twice");
     WRONG(PARSE("a", "b", "c"), "\"c\" is one operand too many");

@@ -3,7 +3,7 @@
  * so that its triangles change all the time. Without weight it begins fine and is joined where it stands. */
 #ifndef TESTS_NET_ADAPTIVE_SCENE_H
 #define TESTS_NET_ADAPTIVE_SCENE_H
-#include "server/mesh/geometry/stomach.h"
+#include "server/mesh/geometry/procedural.h"
 #include "server/sim/core/definition.h"
 #include "tests/check.h"
 

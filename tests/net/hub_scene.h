@@ -1,7 +1,7 @@
 /* A small organ of our own as a scene, built in the test: no files needed. */
 #ifndef TESTS_NET_SMALL_SCENE_H
 #define TESTS_NET_SMALL_SCENE_H
-#include "server/mesh/geometry/organ.h"
+#include "server/mesh/geometry/procedural.h"
 #include "server/sim/core/definition.h"
 #include "tests/check.h"
 

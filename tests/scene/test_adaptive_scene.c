@@ -1,6 +1,6 @@
 /* Scenes of model adaptive_springs: surfaces as they are, shapes, supports on open edges, what is refused; what is
  * saved loads to the same. */
-#include "server/mesh/geometry/stomach.h"
+#include "server/mesh/geometry/procedural.h"
 #include "server/scene/scene_file.h"
 #include "server/sim/surface/adaptive_surface.h"
 #include "server/sim/world/world.h"

@@ -1,5 +1,5 @@
 /* Voxels split into smaller ones: the body, its fill and its volume stay, the lattice is finer. */
-#include "server/mesh/geometry/organ.h"
+#include "server/mesh/geometry/procedural.h"
 #include "server/solve/voxel_refinement.h"
 #include "tests/check.h"
 

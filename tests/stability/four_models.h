@@ -5,7 +5,7 @@
 #define TESTS_STABILITY_FOUR_MODELS_H
 #include "server/base/vec3.h"
 #include "server/mesh/cells/cell_shapes.h"
-#include "server/mesh/geometry/stomach.h"
+#include "server/mesh/geometry/procedural.h"
 #include "server/sim/surface/adaptive_surface.h"
 #include "server/sim/world/world.h"
 #include "tests/fixtures/boxes.h"

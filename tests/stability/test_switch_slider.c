@@ -4,7 +4,7 @@
  * out, the grip holds and pulls without a jump, and at last pulls as if only the last configuration had ever been
  * there. --table prints every switch, --sweep MM SEEDS the worst of an organ pulled by MM mm with each of so many
  * seeds, and asserts nothing. */
-#include "server/mesh/geometry/organ.h"
+#include "server/mesh/geometry/procedural.h"
 #include "server/num/random.h"
 #include "tests/stability/hard_case.h"
 #include "tests/stability/switch_beam.h"

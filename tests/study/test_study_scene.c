@@ -3,7 +3,7 @@
 #include "server/study/study.h"
 
 #include "server/base/vec3.h"
-#include "server/mesh/geometry/stomach.h"
+#include "server/mesh/geometry/procedural.h"
 #include "server/robustness/robustness.h"
 #include "server/study/study_job.h"
 #include "tests/check.h"

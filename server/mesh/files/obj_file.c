@@ -1,7 +1,6 @@
 /* Wavefront OBJ: positions and faces (n-gons as fans, negative indices, v/vt/vn forms, continuation lines); everything
  * else is left out. */
 #include "server/mesh/files/mesh_build.h"
-#include <string.h>
 
 static const char *const keywords[] = {"v", "vt", "vn", "vp", "f", "l", "p", "g", "o", "s", "usemtl", "mtllib", "#"};
 

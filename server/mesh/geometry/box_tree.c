@@ -25,7 +25,6 @@ struct pal_box_tree {
     int32_t *item; /* triangles in tree order */
 };
 
-/* of the recursive build */
 typedef struct builder {
     pal_box_tree *tree;
     double *centroid; /* of each triangle [n_tri][3] */

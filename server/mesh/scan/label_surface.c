@@ -266,14 +266,13 @@ static double level_of(const float *value, size_t n, int64_t n_label)
 /* metres -> voxel index, the inverse of to_m with index zero at voxel `low` */
 static void invert(const double m[12], const int low[3], double out[12])
 {
-    double d = determinant(m);
-    for (int r = 0; r < 3; r++)
-        for (int c = 0; c < 3; c++) {
-            int a = (c + 1) % 3, b = (c + 2) % 3, e = (r + 1) % 3, f = (r + 2) % 3;
-            out[4 * r + c] = (m[4 * a + e] * m[4 * b + f] - m[4 * a + f] * m[4 * b + e]) / d;
-        }
-    for (int r = 0; r < 3; r++)
+    const double axes[9] = {m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]};
+    double inverse[9];
+    (void)pal_inverse33(inverse, axes);
+    for (int r = 0; r < 3; r++) {
+        pal_copy3(out + 4 * r, inverse + 3 * r);
         out[4 * r + 3] = -(out[4 * r] * m[3] + out[4 * r + 1] * m[7] + out[4 * r + 2] * m[11]) - low[r];
+    }
 }
 
 /* the extent of a voxel along each axis, m; returns the largest */

@@ -10,7 +10,6 @@
 #include "server/mesh/files/scalar_bytes.h"
 #include "server/mesh/files/text_scan.h"
 
-#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 #include <zlib.h>

@@ -106,6 +106,13 @@ void pal_prepared_free(pal_prepared *prepared)
     pal_hexes_free(&prepared->hexes);
 }
 
+double pal_prepared_missing(const pal_prepared *mesh)
+{
+    double sum = 0, cube = mesh->tets.edge_m * mesh->tets.edge_m * mesh->tets.edge_m;
+    for (int e = 0; e < mesh->hexes.n_hex; e++) sum += cube * (double)mesh->hexes.fill[e];
+    return 1 - sum / fabs(pal_surface_volume(&mesh->surface));
+}
+
 pal_err pal_prepared_make(const pal_surface *surface, const pal_voxel_options *options, pal_prepared *out,
                           pal_prepare_report *report, pal_diagnostic *diag)
 {

@@ -24,6 +24,8 @@ typedef struct pal_prepare_report {
  * the hexahedra is measured when options->fill or options->min_fill asks for it, else it is 1 */
 pal_err pal_prepared_make(const pal_surface *surface, const pal_voxel_options *options, pal_prepared *out,
                           pal_prepare_report *report, pal_diagnostic *diag);
+/* share of the surface's volume that the filled hexahedra lack */
+double pal_prepared_missing(const pal_prepared *mesh);
 /* the surface alone, copied, without tetrahedra, hexahedra and skin; MEMORY */
 pal_err pal_prepared_surface(const pal_surface *surface, pal_prepared *out);
 void pal_prepared_free(pal_prepared *prepared);

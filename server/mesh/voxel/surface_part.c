@@ -124,7 +124,6 @@ static void reverse_triangle(int32_t *tri)
     tri[2] = swap;
 }
 
-/* a . (b x c) */
 static double triple_product(const double a[3], const double b[3], const double c[3])
 {
     double cross[3];

@@ -34,7 +34,6 @@ bool pal_scan_plain(const pal_crossings *crossings, pal_bits *inside)
     return 2 * n_flat <= n_pair;
 }
 
-/* all that the methods share */
 typedef struct decision {
     const pal_surface *surface;
     const pal_voxels *grid;

@@ -10,11 +10,10 @@ pal_err pal_contact_springs_make(pal_contact_points *points, const pal_body *bod
 {
     pal_contact_springs t = {.points = points, .body = body, .max_row = max_row};
     t.start = PAL_NEW(arena, int32_t, max_row + 1);
-    t.k_N_m = PAL_NEW(arena, double, max_row);
-    t.motion_m = PAL_NEW(arena, double, max_row);
+    const bool numbers = PAL_NEW_DOUBLES(arena, max_row, &t.k_N_m, &t.motion_m);
     t.part = PAL_NEW(arena, pal_contact_spring_part, max_row * PAL_CONTACT_POINT_SLOTS);
     *out = t;
-    return t.start && t.k_N_m && t.motion_m && t.part ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    return t.start && numbers && t.part ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 void pal_contact_springs_begin(pal_contact_springs *springs)

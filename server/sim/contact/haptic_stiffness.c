@@ -184,22 +184,18 @@ bool pal_grasp_compliance_series(const pal_grasp_compliance *w, double k_N_m, do
 {
     const double(*give)[3] = w->column_m_N;
     const int n = w->n_known;
-    double c[3][3], minor[3][3];
+    double c[9], inverse[9];
     if (n == 0 || !(k_N_m > 0)) return false;
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
-            c[i][j] = i < n && j < n ? 0.5 * (give[i][j] + give[j][i]) : 0;
-            if (i == j) c[i][j] = (i < n ? c[i][i] : give[0][0]) + 1 / k_N_m;
+            c[3 * i + j] = i < n && j < n ? 0.5 * (give[i][j] + give[j][i]) : 0;
+            if (i == j) c[3 * i + j] = (i < n ? c[3 * i + j] : give[0][0]) + 1 / k_N_m;
         }
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            int a = (i + 1) % 3, b = (i + 2) % 3, p = (j + 1) % 3, q = (j + 2) % 3;
-            minor[i][j] = c[a][p] * c[b][q] - c[a][q] * c[b][p];
-        }
-    double det = pal_dot3(c[0], minor[0]);
-    if (!(det > 0) || !(c[0][0] > 0) || !(minor[2][2] > 0)) return false;
+    const double det = pal_inverse33(inverse, c);
+    /* the leading minors are positive: so is the matrix */
+    if (!(det > 0) || !(c[0] > 0) || !(inverse[8] > 0)) return false;
     for (int i = 0, k = 0; i < 3; i++)
-        for (int j = i; j < 3; j++) K[k++] = minor[i][j] / det;
+        for (int j = i; j < 3; j++) K[k++] = inverse[3 * i + j];
     return isfinite(det);
 }
 

@@ -53,9 +53,9 @@ void pal_push_follow_side(pal_tool_contact *t, const double side_before[3], doub
 
 /* interpolated: the stiffness that the points near a tool will want, as pal_effect.bounds.wanted */
 void pal_push_want(pal_push *push, const pal_body *body, double *bound_N_m);
-/* implicit: memory beside; pal_tangent.settle */
+/* implicit: memory beside; pal_tangent.settle, self a pal_push */
 pal_err pal_push_make_implicit(pal_push *push, pal_build *build);
-bool pal_push_settle(pal_push *push, pal_step *step, const double *moved, bool last);
+bool pal_push_settle(void *self, pal_step *step, const double *moved, bool last);
 
 /* the patches of a tool for a haptic bridge, in the last sub-step */
 void pal_push_publish(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step *step);

@@ -76,8 +76,9 @@ static void act(pal_push *push, int n_tool, pal_step *step)
     for (int t = 0; t < n_tool; t++) begin(push, &push->tool[t], &step->tools->tool[t], step);
 }
 
-bool pal_push_settle(pal_push *push, pal_step *step, const double *moved, bool last)
+bool pal_push_settle(void *self, pal_step *step, const double *moved, bool last)
 {
+    pal_push *push = self;
     pal_tools *tools = step->tools;
     int n_tool = tools->n_tool < push->n_tool ? tools->n_tool : push->n_tool;
     bool again = false;

@@ -31,20 +31,14 @@ const char *pal_field_title(pal_field field)
     return title[(unsigned)field < PAL_FIELD_COUNT ? field : PAL_FIELD_NONE];
 }
 
-/* n numbers each; false: no memory */
-static bool allocate(pal_arena *arena, size_t n, double **const *to, int n_to)
-{
-    bool all = true;
-    for (int i = 0; i < n_to; i++) all = (*to[i] = PAL_NEW(arena, double, n)) && all;
-    return all;
-}
-
 pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node)
 {
-    double **const vectors[] = {&body->x, &body->v, &body->f, &body->load, &body->x_rest};
+    const size_t n3 = 3 * (size_t)n_node;
     body->mass_kg = PAL_NEW(arena, double, n_node);
     body->support = PAL_NEW(arena, uint8_t, n_node);
-    if (!allocate(arena, 3 * (size_t)n_node, vectors, 5) || !body->mass_kg || !body->support) return PAL_ERR_MEMORY;
+    if (!PAL_NEW_DOUBLES(arena, n3, &body->x, &body->v, &body->f, &body->load, &body->x_rest) || !body->mass_kg ||
+        !body->support)
+        return PAL_ERR_MEMORY;
     body->n_dof = body->n_node = body->n_active = n_node;
     body->d = body->x;
     body->dv = body->v;
@@ -56,10 +50,12 @@ pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node)
 
 pal_err pal_body_allocate_interpolated(pal_body *body, pal_arena *arena, const pal_interpolation *rows)
 {
-    double **const vectors[] = {&body->d, &body->dv, &body->f, &body->load, &body->node_rest};
+    const size_t n3 = 3 * (size_t)rows->n_row;
     PAL_TRY(pal_body_allocate(body, arena, rows->n_point));
     body->node_mass_kg = PAL_NEW(arena, double, rows->n_row);
-    if (!allocate(arena, 3 * (size_t)rows->n_row, vectors, 5) || !body->node_mass_kg) return PAL_ERR_MEMORY;
+    if (!PAL_NEW_DOUBLES(arena, n3, &body->d, &body->dv, &body->f, &body->load, &body->node_rest) ||
+        !body->node_mass_kg)
+        return PAL_ERR_MEMORY;
     body->n_node = rows->n_row;
     body->interpolation = rows;
     return PAL_ERR_OK;

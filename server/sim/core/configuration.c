@@ -297,14 +297,6 @@ static void align(const pal_body_def *body, const pal_surface *surface, int size
     }
 }
 
-/* part of the surface's volume outside the filled voxels */
-static double missing(const pal_prepared *mesh)
-{
-    double sum = 0, cube = mesh->tets.edge_m * mesh->tets.edge_m * mesh->tets.edge_m;
-    for (int e = 0; e < mesh->hexes.n_hex; e++) sum += cube * (double)mesh->hexes.fill[e];
-    return 1 - sum / fabs(pal_surface_volume(&mesh->surface));
-}
-
 /* drops components without support in voxels of this size, as preparation does */
 static pal_err drop_loose(const pal_body_def *body, const double up[3], pal_prepared *mesh, pal_diagnostic *diag)
 {
@@ -317,24 +309,26 @@ static pal_err drop_loose(const pal_body_def *body, const double up[3], pal_prep
     return err;
 }
 
+pal_err pal_filled_voxels_make(const pal_surface *surface, pal_voxel_options *voxel, pal_prepared *out,
+                               pal_prepare_report *report, pal_diagnostic *diag)
+{
+    voxel->min_fill = PAL_VOXEL_DROP_FILL;
+    PAL_TRY(pal_prepared_make(surface, voxel, out, report, diag));
+    if (pal_prepared_missing(out) <= PAL_VOXEL_MAX_MISSING) return PAL_ERR_OK;
+    /* thin parts consist of voxels with little inside */
+    pal_prepared_free(out);
+    voxel->min_fill = PAL_FILL_MIN;
+    return pal_prepared_make(surface, voxel, out, report, diag);
+}
+
 static pal_err fill_voxels(const pal_body_def *body, const double up[3], const pal_surface *surface, int size,
                            pal_prepared *out, pal_diagnostic *diag)
 {
     pal_prepare_report report;
     pal_diagnostic reason = {{0}};
-    pal_voxel_options voxel = {.resolution = size,
-                               .border = true,
-                               .min_fill = PAL_VOXEL_DROP_FILL,
-                               .fill = true,
-                               .max_voxel = MAX_KEPT_VOXELS};
+    pal_voxel_options voxel = {.resolution = size, .border = true, .fill = true, .max_voxel = MAX_KEPT_VOXELS};
     align(body, surface, size, voxel.ahead);
-    pal_err err = pal_prepared_make(surface, &voxel, out, &report, &reason);
-    /* thin parts consist of voxels with little inside */
-    if (!err && missing(out) > PAL_VOXEL_MAX_MISSING) {
-        pal_prepared_free(out);
-        voxel.min_fill = PAL_FILL_MIN;
-        err = pal_prepared_make(surface, &voxel, out, &report, &reason);
-    }
+    pal_err err = pal_filled_voxels_make(surface, &voxel, out, &report, &reason);
     if (!err && report.voxel.n_component > 1 && (err = drop_loose(body, up, out, &reason))) pal_prepared_free(out);
     return err ? pal_diagnostic_set(diag, err, "body \"%s\" in %d voxels: %s", body->name, size, reason.text)
                : PAL_ERR_OK;

@@ -60,6 +60,10 @@ bool pal_configuration_support_box(const pal_scene *scene, int body, int support
  * range; BUDGET, MEMORY */
 pal_err pal_configuration_make(const pal_scene *from, int body, const pal_configuration *to, pal_diagnostic *diag,
                                pal_configured_scene **out);
+/* The voxels of a body whose cut voxels count by their filled share: those with less than PAL_VOXEL_DROP_FILL inside
+ * are dropped where that keeps the volume, else those below PAL_FILL_MIN; sets voxel->min_fill. As pal_prepared_make */
+pal_err pal_filled_voxels_make(const pal_surface *surface, pal_voxel_options *voxel, pal_prepared *out,
+                               pal_prepare_report *report, pal_diagnostic *diag);
 void pal_configured_scene_free(pal_configured_scene *scene); /* NULL is fine */
 /* Estimate of the nodes that pal_configuration_make would make: of voxels from volume and area of the shown surface
  * (within 25 % from 8 voxels on), of tet10 7 times as many, of an adaptive surface 4 times its vertices a level. 0: the

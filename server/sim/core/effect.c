@@ -5,12 +5,19 @@
 
 #include <string.h>
 
-pal_err pal_run_forces(pal_step *step, bool packed)
+static bool skips(const pal_step *step, const pal_effect *effect, pal_forces which)
 {
+    if (which == PAL_FORCES_ALL || which == PAL_FORCES_PACKED) return step->drag_separate && effect->drag;
+    return effect->drag || effect->internal != (which == PAL_FORCES_INTERNAL);
+}
+
+pal_err pal_run_forces(pal_step *step, pal_forces which)
+{
+    const bool packed = which == PAL_FORCES_PACKED;
     uint64_t before = pal_clock_ns();
     for (int i = 0; i < step->n_force; i++) {
         pal_component *component = &step->force[i];
-        if (step->drag_separate && component->effect->drag) continue;
+        if (skips(step, component->effect, which)) continue;
         component->n_run++;
         PAL_TRY((packed ? component->effect->compute_forces : component->effect->run)(component->self, step));
         uint64_t now = pal_clock_ns();
@@ -29,12 +36,20 @@ pal_err pal_assemble_forces(pal_step *step)
     }
     pal_body_update_nodes(body);
     if (!body->active) memcpy(body->f, body->load, 3 * sizeof(double) * (size_t)body->n_node);
-    PAL_TRY(pal_run_forces(step, false));
+    PAL_TRY(pal_run_forces(step, PAL_FORCES_ALL));
     if (body->interpolation) {
         memset(body->g, 0, 3 * sizeof(double) * (size_t)body->n_dof);
         pal_interpolation_apply_transpose(body->interpolation, body->f, body->g);
     }
     return PAL_ERR_OK;
+}
+
+double pal_components_energy_J(const pal_component *component, int n, const pal_body *body)
+{
+    double sum = 0;
+    for (int i = 0; i < n; i++)
+        if (component[i].effect->energy) sum += component[i].effect->energy(component[i].self, body);
+    return sum;
 }
 
 const char *pal_stage_name(pal_stage stage)

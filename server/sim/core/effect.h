@@ -148,8 +148,9 @@ typedef struct pal_effect {
     void (*transfer)(void *self, const pal_body *body, const void *before, const pal_component_transfer *by);
     bool keeps_components; /* SOLVE: holds pointers to or patterns of the body's components, so it is made again when
                               they change */
-    bool implicit; /* SOLVE: an implicit solver, which takes stiffness and contact by tangents; sets body->implicit
-                      before other components are made       */
+    bool moves_nodes; /* SOLVE: bodies whose nodes are interpolated are refused                                    */
+    bool implicit;    /* SOLVE: an implicit solver, which takes stiffness and contact by tangents; sets body->implicit
+                         before other components are made       */
 
     /* ---- force ---- */
     /* FORCE components add to body->f, CONTACT components to body->load and to the forces on tools. [sim] */
@@ -213,6 +214,9 @@ typedef struct pal_effect {
     } inspect;
 } pal_effect;
 
+/* the members of an effect made from entries of scenes, by the functions make and run of its file */
+#define PAL_EFFECT(NAME, STAGE) .name = NAME, .stage = PAL_STAGE_##STAGE, .make = make, .run = run
+
 struct pal_component {
     const pal_effect *effect;
     void *self;
@@ -223,9 +227,12 @@ struct pal_component {
     pal_arena *arena;   /* its own memory; NULL: somebody else's                                      */
 };
 
-/* Runs every FORCE component, without drag when drag_separate is set: compute_forces when packed (active_nodes.h), else
- * run. Adds to each component's spent_ns. [sim] */
-pal_err pal_run_forces(pal_step *step, bool packed);
+/* FORCE components: all but those that drag_separate omits, by `run` or by compute_forces (active_nodes.h); those that
+ * are `internal` or are not, without drag */
+typedef enum pal_forces { PAL_FORCES_ALL, PAL_FORCES_PACKED, PAL_FORCES_INTERNAL, PAL_FORCES_EXTERNAL } pal_forces;
+/* Runs these components. Adds to each component's spent_ns. [sim] */
+pal_err pal_run_forces(pal_step *step, pal_forces which);
+double pal_components_energy_J(const pal_component *component, int n, const pal_body *body); /* sum of n. [sim] */
 /* d = A x; f = load plus the forces of all components; g = A' f. Fixed dofs have forces too: what their support bears.
  * [sim] */
 pal_err pal_assemble_forces(pal_step *step);

@@ -11,9 +11,7 @@ static size_t size(const pal_force_cache *cache)
 pal_err pal_force_cache_make(int n_node, pal_arena *arena, pal_force_cache *out)
 {
     *out = (pal_force_cache){.n_node = n_node};
-    out->d = PAL_NEW(arena, double, 3 * (size_t)n_node);
-    out->f = PAL_NEW(arena, double, 3 * (size_t)n_node);
-    return out->d && out->f ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    return PAL_NEW_DOUBLES(arena, 3 * (size_t)n_node, &out->d, &out->f) ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 bool pal_force_cache_matches(const pal_force_cache *cache, const double *d)

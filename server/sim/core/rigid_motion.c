@@ -34,13 +34,18 @@ void pal_rigid_momenta(int n, const double *mass_kg, const double *x, const doub
     }
 }
 
-void pal_rigid_spin(const double inertia[9], const double moment[3], double min, double spin[3])
+int pal_rigid_spin(const double inertia[9], const double moment[3], double min, double spin[3])
 {
     double w[3], axis[9];
+    int n_axis = 0;
     pal_set3(spin, 0, 0, 0);
     pal_eigen3(inertia, w, axis);
-    for (int k = 0; k < 3; k++)
-        if (w[k] > 1e-12 * w[2] && w[k] > min) pal_axpy3(spin, pal_dot3(axis + 3 * k, moment) / w[k], axis + 3 * k);
+    for (int k = 0; k < 3; k++) {
+        if (!(w[k] > 1e-12 * w[2] && w[k] > min)) continue;
+        pal_axpy3(spin, pal_dot3(axis + 3 * k, moment) / w[k], axis + 3 * k);
+        n_axis++;
+    }
+    return n_axis;
 }
 
 void pal_rigid_motion_find(int n, const double *mass_kg, const double *x, const double momentum[3],
@@ -55,7 +60,15 @@ void pal_rigid_motion_find(int n, const double *mass_kg, const double *x, const 
             for (int b = 0; b < 3; b++) inertia[3 * a + b] += mass_kg[i] * ((a == b) * pal_dot3(r, r) - r[a] * r[b]);
     }
     pal_scale3(out->linear, sum > 0 ? 1 / sum : 0, momentum);
-    pal_rigid_spin(inertia, moment, 0, out->angular);
+    out->n_axis = pal_rigid_spin(inertia, moment, 0, out->angular);
+}
+
+void pal_rigid_motion_of(int n, const double *mass_kg, const double *x, const double *v, double momentum[3],
+                         double moment[3], pal_rigid_motion *out)
+{
+    pal_rigid_centre(n, mass_kg, x, out->centre_m);
+    pal_rigid_momenta(n, mass_kg, x, v, out->centre_m, momentum, moment);
+    pal_rigid_motion_find(n, mass_kg, x, momentum, moment, out);
 }
 
 void pal_rigid_motion_at(const pal_rigid_motion *motion, const double x[3], double out[3])

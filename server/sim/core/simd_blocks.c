@@ -1,6 +1,8 @@
 /* Order of nodes, strips and loose blocks. */
 #include "server/sim/core/simd_blocks.h"
 
+#include "server/base/vec3.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,11 +20,8 @@ typedef struct lattice {
 static bool find_lattice(const double *x, int n_node, double edge_m, lattice *to)
 {
     double high[3];
-    for (int c = 0; c < 3; c++) to->low[c] = INFINITY, high[c] = -INFINITY;
-    for (int i = 0; i < 3 * n_node; i++) {
-        to->low[i % 3] = fmin(to->low[i % 3], x[i]);
-        high[i % 3] = fmax(high[i % 3], x[i]);
-    }
+    pal_box3_empty(to->low, high);
+    for (int i = 0; i < n_node; i++) pal_box3_add(to->low, high, x + 3 * (size_t)i);
     double n_finest = 1;
     for (int c = 0; c < 3; c++) {
         double n = floor((high[c] - to->low[c]) / edge_m + 1.5);
@@ -71,9 +70,7 @@ pal_err pal_node_order_make(const double *x_rest, int n_node, double edge_m, pal
     /* lanes without a constraint may reach beyond the last slot */
     n_slot = (n_slot + 2 * PAL_LANES - 1) & ~(PAL_LANES - 1);
     *s = (pal_node_order){.n_node = n_node, .n_slot = n_slot, .slot = slot};
-    s->x = PAL_NEW(arena, double, 3 * (size_t)n_slot);
-    s->f = PAL_NEW(arena, double, 3 * (size_t)n_slot);
-    if (!s->x || !s->f) return PAL_ERR_MEMORY;
+    if (!PAL_NEW_DOUBLES(arena, 3 * (size_t)n_slot, &s->x, &s->f)) return PAL_ERR_MEMORY;
     *out = s;
     return PAL_ERR_OK;
 }

@@ -1,20 +1,17 @@
 /* Tool bookkeeping between poses and CONTACT rows. */
 #include "server/sim/core/tools.h"
 
+#include "server/base/vec3.h"
 #include "server/sim/core/blend.h"
 
-#include <math.h>
 #include <string.h>
 
 bool pal_pose_ok(const pal_pose *pose, double limit_m)
 {
-    double far2 = 0, fast2 = 0, quat2 = 0;
-    for (int c = 0; c < 3; c++) {
-        if (!isfinite(pose->position_m[c]) || !isfinite(pose->velocity_m_s[c])) return false;
-        far2 += pose->position_m[c] * pose->position_m[c];
-        fast2 += pose->velocity_m_s[c] * pose->velocity_m_s[c];
-    }
+    double far2 = pal_dot3(pose->position_m, pose->position_m), quat2 = 0;
+    double fast2 = pal_dot3(pose->velocity_m_s, pose->velocity_m_s);
     for (int c = 0; c < 4; c++) quat2 += pose->quat[c] * pose->quat[c];
+    /* false of numbers that are not finite */
     return far2 <= limit_m * limit_m && fast2 <= 1e6 * limit_m * limit_m && quat2 > 0.9 && quat2 < 1.1;
 }
 

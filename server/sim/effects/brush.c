@@ -103,7 +103,7 @@ static double reach(const pal_body *body, const pal_brush *b, int i, double *t)
 }
 
 /* allocates the arrays of a slot for the items in reach; the weights of a handle sum to 1 */
-static pal_err fill(const pal_body *body, const pal_brush *b, slot *s, pal_diagnostic *diag)
+static pal_err take_items(const pal_body *body, const pal_brush *b, slot *s, pal_diagnostic *diag)
 {
     const bool curve = b->kind == PAL_BRUSH_CURVE;
     const int n = curve ? body->display.n_shown : body->display.surface->n_tri;
@@ -131,6 +131,15 @@ static pal_err fill(const pal_body *body, const pal_brush *b, slot *s, pal_diagn
         return PAL_REFUSE(diag, "brush: stiffness_N_m %g, body \"%s\" takes up to %.3g over %d nodes", b->stiffness_N_m,
                           body->name, limit, s->n);
     return PAL_ERR_OK;
+}
+
+/* the same with an arena of the slot's own, which it keeps on success only */
+static pal_err fill(const pal_body *body, const pal_brush *b, slot *s, pal_diagnostic *diag)
+{
+    s->arena = pal_arena_create(4096, true);
+    pal_err err = s->arena ? take_items(body, b, s, diag) : PAL_ERR_MEMORY;
+    if (err) pal_arena_destroy(s->arena);
+    return err;
 }
 
 /* ---- set and end ---- */
@@ -184,9 +193,7 @@ pal_err pal_brush_set(void *self, const pal_body *body, int slot_index, const pa
         s->left_s = PAL_BLEND_S;
         return PAL_ERR_OK;
     }
-    fresh.arena = pal_arena_create(4096, true);
-    pal_err err = fresh.arena ? fill(body, b, &fresh, diag) : PAL_ERR_MEMORY;
-    if (err) pal_arena_destroy(fresh.arena);
+    pal_err err = fill(body, b, &fresh, diag);
     if (err == PAL_ERR_MEMORY) return pal_diagnostic_set(diag, err, "no memory for a brush on body \"%s\"", body->name);
     PAL_TRY(err);
     goal(b, fresh.now);
@@ -218,11 +225,7 @@ void pal_brush_hand(void *self, const pal_body *body, const void *before, const 
         const slot *was = &((const brushes *)before)->slot[i];
         slot *s = &((brushes *)self)->slot[i], fresh = {.brush = was->brush};
         double back[3];
-        if (!acts(was) || !(fresh.arena = pal_arena_create(4096, true))) continue;
-        if (fill(body, &was->brush, &fresh, NULL)) {
-            pal_arena_destroy(fresh.arena);
-            continue;
-        }
+        if (!acts(was) || fill(body, &was->brush, &fresh, NULL)) continue;
         for (int k = 0; k < fresh.n && was->brush.kind == PAL_BRUSH_CURVE; k++) {
             const size_t node = 3 * (size_t)fresh.item[k];
             displacement_back(was, from, body->node_rest + node, back);
@@ -249,17 +252,17 @@ bool pal_brush_gone(const void *self)
 
 size_t pal_brush_bytes(const void *self)
 {
-    const brushes *row = self;
+    const brushes *all = self;
     size_t n_byte = 0;
     for (int i = 0; i < PAL_TOOL_MAX; i++)
-        if (row->slot[i].arena) n_byte += pal_arena_used(row->slot[i].arena);
+        if (all->slot[i].arena) n_byte += pal_arena_used(all->slot[i].arena);
     return n_byte;
 }
 
 static void destroy(void *self)
 {
-    brushes *row = self;
-    for (int i = 0; i < PAL_TOOL_MAX; i++) pal_arena_destroy(row->slot[i].arena);
+    brushes *all = self;
+    for (int i = 0; i < PAL_TOOL_MAX; i++) pal_arena_destroy(all->slot[i].arena);
 }
 
 /* ---- a step ---- */
@@ -307,13 +310,13 @@ static double spring(const slot *s, int k)
 
 static pal_err run(void *self, pal_step *step)
 {
-    brushes *row = self;
+    brushes *all = self;
     pal_body *body = step->body;
-    if (step->sub == 0) row->step_s = step->dt_s * step->n_sub;
+    if (step->sub == 0) all->step_s = step->dt_s * step->n_sub;
     for (int i = 0; i < PAL_TOOL_MAX; i++) {
-        slot *s = &row->slot[i];
+        slot *s = &all->slot[i];
         if (!acts(s)) continue;
-        if (step->sub == 0) advance(s, row->step_s);
+        if (step->sub == 0) advance(s, all->step_s);
         if (s->brush.kind == PAL_BRUSH_INFLATE) inflate(s, body, body->load);
         for (int k = 0; k < s->n && s->brush.kind == PAL_BRUSH_CURVE; k++) {
             double off[3];
@@ -327,10 +330,10 @@ static pal_err run(void *self, pal_step *step)
 /* of handles alone */
 static double energy(void *self, const pal_body *body)
 {
-    const brushes *row = self;
+    const brushes *all = self;
     double sum = 0;
     for (int i = 0; i < PAL_TOOL_MAX; i++) {
-        const slot *s = &row->slot[i];
+        const slot *s = &all->slot[i];
         for (int k = 0; k < s->n && acts(s) && s->brush.kind == PAL_BRUSH_CURVE; k++) {
             double off[3];
             pull(s, body, k, off);
@@ -343,11 +346,11 @@ static double energy(void *self, const pal_body *body)
 /* with the ramp at the end of the next step */
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
-    const brushes *row = self;
+    const brushes *all = self;
     for (int i = 0; i < PAL_TOOL_MAX; i++) {
-        const slot *s = &row->slot[i];
+        const slot *s = &all->slot[i];
         if (!acts(s)) continue;
-        const double soon = row->step_s > 0 ? pal_blend_toward(s->share, 1, row->step_s, PAL_BLEND_S) : 1;
+        const double soon = all->step_s > 0 ? pal_blend_toward(s->share, 1, all->step_s, PAL_BLEND_S) : 1;
         for (int k = 0; k < s->n && s->brush.kind == PAL_BRUSH_CURVE; k++)
             bound_N_m[s->item[k]] += soon * s->brush.stiffness_N_m * s->weight[k];
         const double p = soon * fmax(fabs(s->now[0]), fabs(s->brush.pressure_Pa)) / 6;
@@ -361,10 +364,10 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 
 static void multiply(void *self, const pal_body *body, double k, const double *p, double *out)
 {
-    const brushes *row = self;
+    const brushes *all = self;
     (void)body;
     for (int i = 0; i < PAL_TOOL_MAX; i++) {
-        const slot *s = &row->slot[i];
+        const slot *s = &all->slot[i];
         for (int n = 0; n < s->n && acts(s) && s->brush.kind == PAL_BRUSH_CURVE; n++)
             pal_axpy3(out + 3 * (size_t)s->item[n], k * spring(s, n), p + 3 * (size_t)s->item[n]);
     }
@@ -373,9 +376,9 @@ static void multiply(void *self, const pal_body *body, double k, const double *p
 /* the body was reset: no brush acts on it */
 static void reset(void *self, const pal_body *body)
 {
-    brushes *row = self;
+    brushes *all = self;
     (void)body;
-    for (int i = 0; i < PAL_TOOL_MAX; i++) row->slot[i].ending = true, row->slot[i].share = 0;
+    for (int i = 0; i < PAL_TOOL_MAX; i++) all->slot[i].ending = true, all->slot[i].share = 0;
 }
 
 /* the load of an active brush changes with time */

@@ -25,38 +25,39 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
         return PAL_REFUSE(build->diag, "%s: \"%s\" needs a body of model subdivision_fem", item->path, item->name);
     PAL_TRY(pal_entry_read_choice(item, "operator", names, 2, &operator_kind, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
-    pal_cells_elastic *row = PAL_NEW(build->arena, pal_cells_elastic, 1);
-    if (!row) return PAL_ERR_MEMORY;
-    *self = row;
-    PAL_TRY(pal_cells_elastic_make(solid, (pal_cell_operator)operator_kind, build->arena, row, build->diag));
+    pal_cells_elastic *cells = PAL_NEW(build->arena, pal_cells_elastic, 1);
+    if (!cells) return PAL_ERR_MEMORY;
+    *self = cells;
+    PAL_TRY(pal_cells_elastic_make(solid, (pal_cell_operator)operator_kind, build->arena, cells, build->diag));
     const bool cached = operator_kind == PAL_CELL_POLAR && build->body->implicit;
-    return cached ? pal_force_cache_make(build->body->n_node, build->arena, &row->force_cache) : PAL_ERR_OK;
+    return cached ? pal_force_cache_make(build->body->n_node, build->arena, &cells->force_cache) : PAL_ERR_OK;
 }
 
 static pal_err run(void *self, pal_step *step)
 {
-    pal_cells_elastic *row = self;
+    pal_cells_elastic *cells = self;
     pal_body *body = step->body;
-    const bool has_inversion = row->recovery.n_region > 0;
-    pal_cells_elastic_refresh(row);
-    body->safeguards.n_inversion += row->recovery.n_inversion, body->safeguards.n_split += row->recovery.n_change;
-    row->recovery.n_inversion = row->recovery.n_change = 0;
+    const bool has_inversion = cells->recovery.n_region > 0;
+    pal_cells_elastic_refresh(cells);
+    body->safeguards.n_inversion += cells->recovery.n_inversion, body->safeguards.n_split += cells->recovery.n_change;
+    cells->recovery.n_inversion = cells->recovery.n_change = 0;
     const uint64_t before = has_inversion ? pal_clock_ns() : 0;
-    if (pal_force_cache_matches(&row->force_cache, body->d))
-        pal_force_cache_add(&row->force_cache, body->f);
+    if (pal_force_cache_matches(&cells->force_cache, body->d))
+        pal_force_cache_add(&cells->force_cache, body->f);
     else
-        pal_cells_elastic_force(row, body->d, body->f);
+        pal_cells_elastic_force(cells, body->d, body->f);
     if (has_inversion) body->safeguards.ns += pal_clock_ns() - before;
     return PAL_ERR_OK;
 }
 
 static double energy(void *self, const pal_body *body)
 {
-    pal_cells_elastic *row = self;
-    pal_cells_elastic_refresh(row);
-    if (pal_force_cache_matches(&row->force_cache, body->d)) return row->force_cache.energy_J;
+    pal_cells_elastic *cells = self;
+    pal_cells_elastic_refresh(cells);
+    if (pal_force_cache_matches(&cells->force_cache, body->d)) return cells->force_cache.energy_J;
     return pal_force_cache_commit(
-        &row->force_cache, pal_cells_elastic_energy(row, body->d, pal_force_cache_begin(&row->force_cache, body->d)));
+        &cells->force_cache,
+        pal_cells_elastic_energy(cells, body->d, pal_force_cache_begin(&cells->force_cache, body->d)));
 }
 
 static void reset(void *self, const pal_body *body)
@@ -69,9 +70,9 @@ static void reset(void *self, const pal_body *body)
  * couple control points beyond the elements' own */
 static bool couple(void *self, pal_cliques *out)
 {
-    const pal_cells_elastic *row = self;
-    if (row->volume.n > 0) *out = row->volume.couple;
-    return row->volume.n > 0;
+    const pal_cells_elastic *cells = self;
+    if (cells->volume.n > 0) *out = cells->volume.couple;
+    return cells->volume.n > 0;
 }
 
 /* true: lasting loads or a component with external energy, such as weight, act on the body */
@@ -86,22 +87,22 @@ static bool is_loaded(const pal_step *step)
 
 static unsigned recover(void *self, pal_step *step)
 {
-    pal_cells_elastic *row = self;
-    pal_cells_elastic_refresh(row);
-    const bool changed = pal_cell_recovery_update(&row->recovery, row, step->body, step->time_s, is_loaded(step));
-    if (changed) pal_force_cache_invalidate(&row->force_cache);
-    if (row->recovery.stiffened_J > 0) pal_stiffening_damper_hold(step->body, row->recovery.stiffened_J);
-    const unsigned now = row->recovery.at_rest ? PAL_INVERTED | PAL_INVERSION_AT_REST : PAL_INVERTED;
-    return (row->recovery.n_region > 0 ? now : 0) | (changed ? PAL_INVERSION_CHANGED : 0);
+    pal_cells_elastic *cells = self;
+    pal_cells_elastic_refresh(cells);
+    const bool changed = pal_cell_recovery_update(&cells->recovery, cells, step->body, step->time_s, is_loaded(step));
+    if (changed) pal_force_cache_invalidate(&cells->force_cache);
+    if (cells->recovery.stiffened_J > 0) pal_stiffening_damper_hold(step->body, cells->recovery.stiffened_J);
+    const unsigned now = cells->recovery.at_rest ? PAL_INVERTED | PAL_INVERSION_AT_REST : PAL_INVERTED;
+    return (cells->recovery.n_region > 0 ? now : 0) | (changed ? PAL_INVERSION_CHANGED : 0);
 }
 
 /* at rest, for which solvers ask between steps, there are no inverted regions */
 static void linearise(void *self, const pal_body *body)
 {
-    pal_cells_elastic *row = self;
-    pal_cells_elastic_refresh(row);
-    row->recovery.off = body->d == body->node_rest;
-    pal_cells_elastic_linearise(row, body->d);
+    pal_cells_elastic *cells = self;
+    pal_cells_elastic_refresh(cells);
+    cells->recovery.off = body->d == body->node_rest;
+    pal_cells_elastic_linearise(cells, body->d);
 }
 
 static void multiply(void *self, const pal_body *body, double k, const double *p, double *out)
@@ -144,14 +145,10 @@ static void measure(void *self, const pal_body *body, pal_field field, double *s
 
 static const pal_tangent tangent = {.couple = couple, .linearise = linearise, .multiply = multiply, .rotate = rotate};
 
-const pal_effect pal_effect_cell_elastic = {.name = "cell_elastic",
-                                            .stage = PAL_STAGE_FORCE,
+const pal_effect pal_effect_cell_elastic = {PAL_EFFECT("cell_elastic", FORCE),
                                             .internal = true,
-                                            .make = make,
-                                            .run = run,
                                             .energy = energy,
                                             .reset = reset,
                                             .recovery.recover = recover,
                                             .tangent = &tangent,
-                                            .inspect.measure = measure,
-                                            .inspect.fields = PAL_ELASTIC_FIELDS};
+                                            .inspect = {.measure = measure, .fields = PAL_ELASTIC_FIELDS}};

@@ -10,19 +10,19 @@
 #include <stdlib.h>
 
 typedef struct edge_distance {
-    pal_spring_set row; /* first: see pal_spring_set_material */
+    pal_spring_set set; /* first: see pal_spring_set_material */
     int n_dof;
     double *node_bound; /* sum of 2 q / l0^2 over the edges of each node            [n_dof] */
-    double *node_J;     /* constants at the nodes, of a grid; NULL: row.k_J everywhere [n_dof] */
+    double *node_J;     /* constants at the nodes, of a grid; NULL: set.k_J everywhere [n_dof] */
 } edge_distance;
 
 static void sum_bounds(edge_distance *e)
 {
     for (int i = 0; i < e->n_dof; i++) e->node_bound[i] = 0;
-    for (int i = 0; i < 2 * e->row.n_item; i++) {
-        int lane = e->row.simd_blocks.place[i / 2];
-        const double q = e->row.all ? e->row.all[lane] : e->row.q[lane];
-        e->node_bound[e->row.item[i]] += 2 * q * e->row.w[lane] * e->row.w[lane];
+    for (int i = 0; i < 2 * e->set.n_item; i++) {
+        int lane = e->set.simd_blocks.place[i / 2];
+        const double q = e->set.all ? e->set.all[lane] : e->set.q[lane];
+        e->node_bound[e->set.item[i]] += 2 * q * e->set.w[lane] * e->set.w[lane];
     }
 }
 
@@ -35,20 +35,20 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     if (!e) return PAL_ERR_MEMORY;
     PAL_TRY(pal_tets_edges(build->body->tets, &edge, &n_edge));
     pal_err err = pal_spring_set_make(PAL_SPRING_DISTANCE, item, build, edge, n_edge,
-                                      1e-9 * build->body->length_scale_m, &e->row);
+                                      1e-9 * build->body->length_scale_m, &e->set);
     free(edge);
     PAL_TRY(err);
     e->n_dof = build->body->n_dof;
     e->node_bound = PAL_NEW(build->arena, double, build->body->n_dof);
     if (!e->node_bound) return PAL_ERR_MEMORY;
     sum_bounds(e);
-    if (e->row.spring.on_grid) {
+    if (e->set.spring.on_grid) {
         e->node_J = PAL_NEW(build->arena, double, build->body->n_dof);
         if (!e->node_J) return PAL_ERR_MEMORY;
         pal_spring_nodes(&build->def->spring_grid, PAL_SPRING_DISTANCE, build->body, e->node_J);
     }
-    if (e->row.spring.given)
-        build->body->spring_young_Pa = pal_spring_young_Pa(&e->row, build->body, build->def->material.poisson);
+    if (e->set.spring.given)
+        build->body->spring_young_Pa = pal_spring_young_Pa(&e->set, build->body, build->def->material.poisson);
     *self = e;
     return PAL_ERR_OK;
 }
@@ -66,15 +66,15 @@ PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3],
 }
 
 /* adds what the kernel omits: edges without length push their ends apart along the rest direction */
-static void reopen(const pal_spring_set *row, const pal_body *body)
+static void reopen(const pal_spring_set *set, const pal_body *body)
 {
-    for (int i = 0; i < row->n_item; i++) {
-        int a = 3 * row->item[2 * i], b = 3 * row->item[2 * i + 1], lane = row->simd_blocks.place[i];
-        double d[3], w = row->w[lane];
+    for (int i = 0; i < set->n_item; i++) {
+        int a = 3 * set->item[2 * i], b = 3 * set->item[2 * i + 1], lane = set->simd_blocks.place[i];
+        double d[3], w = set->w[lane];
         pal_sub3(d, body->d + b, body->d + a);
         if (pal_dot3(d, d) * w * w >= PAL_ROUNDING * PAL_ROUNDING) continue;
         pal_sub3(d, body->x_rest + b, body->x_rest + a);
-        double s = row->spring.k_J * row->q[lane] * w * w;
+        double s = set->spring.k_J * set->q[lane] * w * w;
         pal_axpy3(body->f + b, s, d);
         pal_axpy3(body->f + a, -s, d);
     }
@@ -90,19 +90,19 @@ static pal_err run(void *self, pal_step *step)
     const edge_distance *e = self;
     pal_body *body = step->body;
     pal_node_order_load(body->node_order, body->d);
-    double min = pal_spring_run(&e->row, body->node_order, kernel, 2);
+    double min = pal_spring_run(&e->set, body->node_order, kernel, 2);
     pal_node_order_add(body->node_order, body->f);
-    if (min < PAL_ROUNDING * PAL_ROUNDING) reopen(&e->row, body);
-    if (e->row.n_off > 0) pal_spring_recovery_force(body->recovery, &e->row, body);
-    if (e->row.spring.c_Js > 0) pal_spring_damp(&e->row, body, PAL_SPRING_DISTANCE);
+    if (min < PAL_ROUNDING * PAL_ROUNDING) reopen(&e->set, body);
+    if (e->set.n_off > 0) pal_spring_recovery_force(body->recovery, &e->set, body);
+    if (e->set.spring.c_Js > 0) pal_spring_damp(&e->set, body, PAL_SPRING_DISTANCE);
     return PAL_ERR_OK;
 }
 
 static double energy(void *self, const pal_body *body)
 {
-    const pal_spring_set *row = &((edge_distance *)self)->row;
-    const double sum = pal_spring_energy(row, body, PAL_SPRING_DISTANCE);
-    return row->n_off > 0 ? sum + pal_spring_recovery_energy(body->recovery, row, body) : sum;
+    const pal_spring_set *set = &((edge_distance *)self)->set;
+    const double sum = pal_spring_energy(set, body, PAL_SPRING_DISTANCE);
+    return set->n_off > 0 ? sum + pal_spring_recovery_energy(body->recovery, set, body) : sum;
 }
 
 static void reset(void *self, const pal_body *body)
@@ -114,7 +114,7 @@ static void reset(void *self, const pal_body *body)
 /* a body under inversion recovery does not sleep, however slow it is */
 static double settled_s(const void *self)
 {
-    return ((const edge_distance *)self)->row.n_off > 0 ? INFINITY : 0;
+    return ((const edge_distance *)self)->set.n_off > 0 ? INFINITY : 0;
 }
 
 /* |g| = 1/l0 at both ends whatever the deformation; the stiffness across the edge, k C/(l l0), is at most that along
@@ -122,14 +122,14 @@ static double settled_s(const void *self)
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
     const edge_distance *e = self;
-    for (int i = 0; i < body->n_dof; i++) bound_N_m[i] += e->row.spring.k_J * e->node_bound[i];
+    for (int i = 0; i < body->n_dof; i++) bound_N_m[i] += e->set.spring.k_J * e->node_bound[i];
 }
 
 static void damping(void *self, const pal_body *body, double *bound_Ns_m)
 {
     const edge_distance *e = self;
     /* of inverted regions: stiffness times duration; nodes outside have less */
-    const double c_Js = e->row.spring.c_Js + (e->row.n_off > 0 ? body->recovery->damp_s * e->row.spring.k_J : 0);
+    const double c_Js = e->set.spring.c_Js + (e->set.n_off > 0 ? body->recovery->damp_s * e->set.spring.k_J : 0);
     for (int i = 0; i < body->n_dof; i++) bound_Ns_m[i] += c_Js * e->node_bound[i];
 }
 
@@ -138,18 +138,18 @@ static pal_err edit(void *self, const pal_body *body, const pal_material *materi
 {
     edge_distance *e = self;
     PAL_TRY(pal_spring_set_material(self, body, material, diag));
-    if (e->row.whole) sum_bounds(e);
+    if (e->set.whole) sum_bounds(e);
     return PAL_ERR_OK;
 }
 
 /* constants of material regions at the nodes: means over their springs */
-static void measure_regions(const pal_spring_set *row, double *sum, double *volume_m3)
+static void measure_regions(const pal_spring_set *set, double *sum, double *volume_m3)
 {
-    for (int i = 0; i < 2 * row->n_item; i++) {
-        int lane = row->simd_blocks.place[i / 2], node = row->item[i];
-        const double q = row->all ? row->all[lane] : row->q[lane];
-        if (!(row->whole[lane] > 0)) continue;
-        sum[node] += row->spring.k_J * q / row->whole[lane];
+    for (int i = 0; i < 2 * set->n_item; i++) {
+        int lane = set->simd_blocks.place[i / 2], node = set->item[i];
+        const double q = set->all ? set->all[lane] : set->q[lane];
+        if (!(set->whole[lane] > 0)) continue;
+        sum[node] += set->spring.k_J * q / set->whole[lane];
         volume_m3[node] += 1;
     }
 }
@@ -159,28 +159,22 @@ static void measure(void *self, const pal_body *body, pal_field field, double *s
 {
     const edge_distance *e = self;
     if (field != PAL_FIELD_STIFFNESS_J) return;
-    if (e->row.whole) {
-        measure_regions(&e->row, sum, volume_m3);
+    if (e->set.whole) {
+        measure_regions(&e->set, sum, volume_m3);
         return;
     }
     for (int i = 0; i < body->n_dof; i++) {
-        sum[i] += e->node_J ? e->node_J[i] : e->row.spring.k_J;
+        sum[i] += e->node_J ? e->node_J[i] : e->set.spring.k_J;
         volume_m3[i] += 1;
     }
 }
 
-const pal_effect pal_effect_edge_distance = {.name = "edge_distance",
-                                             .stage = PAL_STAGE_FORCE,
+const pal_effect pal_effect_edge_distance = {PAL_EFFECT("edge_distance", FORCE),
                                              .internal = true,
-                                             .make = make,
-                                             .run = run,
                                              .energy = energy,
                                              .sleep.settled_s = settled_s,
-                                             .bounds.stiffness = stiffness,
-                                             .bounds.damping = damping,
-                                             .recovery.springs = springs,
-                                             .recovery.recover = pal_spring_recover,
+                                             .bounds = {.stiffness = stiffness, .damping = damping},
+                                             .recovery = {.springs = springs, .recover = pal_spring_recover},
                                              .reset = reset,
                                              .material = edit,
-                                             .inspect.measure = measure,
-                                             .inspect.fields = 1u << PAL_FIELD_STIFFNESS_J};
+                                             .inspect = {.measure = measure, .fields = 1u << PAL_FIELD_STIFFNESS_J}};

@@ -280,13 +280,9 @@ static pal_err material(void *self, const pal_body *body, const pal_material *to
     return PAL_ERR_OK;
 }
 
-const pal_effect pal_effect_edge_spring = {.name = "edge_spring",
-                                           .stage = PAL_STAGE_FORCE,
+const pal_effect pal_effect_edge_spring = {PAL_EFFECT("edge_spring", FORCE),
                                            .internal = true,
-                                           .make = make,
-                                           .run = run,
                                            .compute_forces = compute_forces,
                                            .energy = energy,
-                                           .bounds.stiffness = stiffness,
-                                           .bounds.damping = damping,
+                                           .bounds = {.stiffness = stiffness, .damping = damping},
                                            .material = material};

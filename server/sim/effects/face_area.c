@@ -9,16 +9,16 @@
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    pal_spring_set *row = PAL_NEW(build->arena, pal_spring_set, 1);
+    pal_spring_set *set = PAL_NEW(build->arena, pal_spring_set, 1);
     int32_t *face;
     int n_face;
     PAL_TRY(pal_spring_set_check(item, build));
-    if (!row) return PAL_ERR_MEMORY;
+    if (!set) return PAL_ERR_MEMORY;
     PAL_TRY(pal_tets_faces(build->body->tets, &face, &n_face));
     double size = build->body->length_scale_m;
-    pal_err err = pal_spring_set_make(PAL_SPRING_AREA, item, build, face, n_face, 2e-12 * size * size, row);
+    pal_err err = pal_spring_set_make(PAL_SPRING_AREA, item, build, face, n_face, 2e-12 * size * size, set);
     free(face);
-    *self = row;
+    *self = set;
     return err;
 }
 

@@ -128,5 +128,4 @@ static void destroy(void *self)
     if (out->body->display.field[out->kind] == &out->shown) out->body->display.field[out->kind] = NULL;
 }
 
-const pal_effect pal_effect_field_output = {
-    .name = "field_output", .stage = PAL_STAGE_OUTPUT, .make = make, .run = run, .reset = reset, .destroy = destroy};
+const pal_effect pal_effect_field_output = {PAL_EFFECT("field_output", OUTPUT), .reset = reset, .destroy = destroy};

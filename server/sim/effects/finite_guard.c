@@ -152,5 +152,4 @@ static void reset(void *self, const pal_body *body)
     keep(self, body);
 }
 
-const pal_effect pal_effect_finite_guard = {
-    .name = "finite_guard", .stage = PAL_STAGE_GUARD, .make = make, .run = run, .material = material, .reset = reset};
+const pal_effect pal_effect_finite_guard = {PAL_EFFECT("finite_guard", GUARD), .material = material, .reset = reset};

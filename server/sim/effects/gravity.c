@@ -11,17 +11,17 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     double size = build->scene->gravity_m_s2;
     PAL_TRY(pal_entry_read_number(item, "acceleration_m_s2", -1e4, 1e4, &size, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
-    gravity *row = PAL_NEW(build->arena, gravity, 1);
-    if (!row) return PAL_ERR_MEMORY;
-    pal_scale3(row->g, -size, build->scene->up);
-    *self = row;
+    gravity *state = PAL_NEW(build->arena, gravity, 1);
+    if (!state) return PAL_ERR_MEMORY;
+    pal_scale3(state->g, -size, build->scene->up);
+    *self = state;
     return PAL_ERR_OK;
 }
 
 static pal_err run(void *self, pal_step *step)
 {
-    const gravity *row = self;
-    const double *m = step->body->node_mass_kg, gx = row->g[0], gy = row->g[1], gz = row->g[2];
+    const gravity *state = self;
+    const double *m = step->body->node_mass_kg, gx = state->g[0], gy = state->g[1], gz = state->g[2];
     double *f = step->body->f;
     const int32_t *active = step->body->active;
     const int n = pal_body_nodes(step->body);
@@ -36,20 +36,19 @@ static pal_err run(void *self, pal_step *step)
 
 static double energy(void *self, const pal_body *body)
 {
-    const gravity *row = self;
+    const gravity *state = self;
     const double *m = body->node_mass_kg;
     const int n = body->active ? 0 : body->n_node;
     double sum = 0, lane[8] = {0};
     int i = 0;
     for (int k = 0; k < pal_body_nodes(body) && body->active; k++)
-        sum += m[body->active[k]] * pal_dot3(row->g, body->d + 3 * body->active[k]);
+        sum += m[body->active[k]] * pal_dot3(state->g, body->d + 3 * body->active[k]);
     /* SIMD: implicit solvers call it twice per step */
     for (; i + 8 <= n; i += 8)
-        for (int l = 0; l < 8; l++) lane[l] += m[i + l] * pal_dot3(row->g, body->d + 3 * (i + l));
-    for (; i < n; i++) sum += m[i] * pal_dot3(row->g, body->d + 3 * i);
+        for (int l = 0; l < 8; l++) lane[l] += m[i + l] * pal_dot3(state->g, body->d + 3 * (i + l));
+    for (; i < n; i++) sum += m[i] * pal_dot3(state->g, body->d + 3 * i);
     for (int l = 0; l < 8; l++) sum += lane[l];
     return -sum;
 }
 
-const pal_effect pal_effect_gravity = {
-    .name = "gravity", .stage = PAL_STAGE_FORCE, .make = make, .run = run, .energy = energy};
+const pal_effect pal_effect_gravity = {PAL_EFFECT("gravity", FORCE), .energy = energy};

@@ -17,57 +17,58 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     PAL_TRY(pal_entry_read_bool(item, "fill", &options.fill, build->diag));
     PAL_TRY(pal_entry_read_bool(item, "recover", &options.recover, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
-    pal_elastic_hexes *row = PAL_NEW(build->arena, pal_elastic_hexes, 1);
-    if (!row) return PAL_ERR_MEMORY;
-    *self = row;
-    return pal_hex_make(&options, build, item->path, row);
+    pal_elastic_hexes *hexes = PAL_NEW(build->arena, pal_elastic_hexes, 1);
+    if (!hexes) return PAL_ERR_MEMORY;
+    *self = hexes;
+    return pal_hex_make(&options, build, item->path, hexes);
 }
 
 static pal_err run(void *self, pal_step *step)
 {
-    pal_elastic_hexes *row = self;
+    pal_elastic_hexes *hexes = self;
     pal_body *body = step->body;
-    pal_recovery_select(row->recovery, body);
-    if (pal_force_cache_matches(&row->force_cache, body->d)) {
-        pal_force_cache_add(&row->force_cache, body->f);
+    pal_recovery_select(hexes->recovery, body);
+    if (pal_force_cache_matches(&hexes->force_cache, body->d)) {
+        pal_force_cache_add(&hexes->force_cache, body->f);
     } else {
         pal_node_order_load(body->node_order, body->d);
-        (row->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_run : pal_hex_corot_run)(row, body->node_order, PAL_RUN_FORCE);
+        (hexes->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_run : pal_hex_corot_run)(hexes, body->node_order,
+                                                                                  PAL_RUN_FORCE);
         pal_node_order_add(body->node_order, body->f);
     }
-    pal_recovery_add_forces(row->recovery, body);
+    pal_recovery_add_forces(hexes->recovery, body);
     return PAL_ERR_OK;
 }
 
-static double elements_energy(pal_elastic_hexes *row, const pal_body *body)
+static double elements_energy(pal_elastic_hexes *hexes, const pal_body *body)
 {
-    if (pal_force_cache_matches(&row->force_cache, body->d)) return row->force_cache.energy_J;
+    if (pal_force_cache_matches(&hexes->force_cache, body->d)) return hexes->force_cache.energy_J;
     pal_node_order_load(body->node_order, body->d);
-    double *forces = pal_force_cache_begin(&row->force_cache, body->d);
+    double *forces = pal_force_cache_begin(&hexes->force_cache, body->d);
     const pal_element_run what = forces ? PAL_RUN_BOTH : PAL_RUN_ENERGY;
-    double sum = row->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_run(row, body->node_order, what)
-                                                 : pal_hex_corot_run(row, body->node_order, what);
+    double sum = hexes->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_run(hexes, body->node_order, what)
+                                                   : pal_hex_corot_run(hexes, body->node_order, what);
     if (forces) pal_node_order_add(body->node_order, forces);
-    return pal_force_cache_commit(&row->force_cache, sum);
+    return pal_force_cache_commit(&hexes->force_cache, sum);
 }
 
 static double energy(void *self, const pal_body *body)
 {
-    pal_elastic_hexes *row = self;
-    pal_recovery_select(row->recovery, body);
-    return elements_energy(row, body) + pal_recovery_energy(row->recovery, body->d, NULL);
+    pal_elastic_hexes *hexes = self;
+    pal_recovery_select(hexes->recovery, body);
+    return elements_energy(hexes, body) + pal_recovery_energy(hexes->recovery, body->d, NULL);
 }
 
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
-    pal_elastic_hexes *row = self;
-    pal_recovery_select(row->recovery, body);
-    if (row->law == PAL_LAW_NEO_HOOKEAN)
-        pal_hex_neo_bound(row, body, bound_N_m);
+    pal_elastic_hexes *hexes = self;
+    pal_recovery_select(hexes->recovery, body);
+    if (hexes->law == PAL_LAW_NEO_HOOKEAN)
+        pal_hex_neo_bound(hexes, body, bound_N_m);
     else
-        for (int i = 0; i < 8 * row->n_hex; i++)
-            bound_N_m[row->hexes->node[i]] += row->bound[row->simd_blocks.place[i / 8]];
-    pal_recovery_bound(row->recovery, bound_N_m);
+        for (int i = 0; i < 8 * hexes->n_hex; i++)
+            bound_N_m[hexes->hexes->node[i]] += hexes->bound[hexes->simd_blocks.place[i / 8]];
+    pal_recovery_bound(hexes->recovery, bound_N_m);
 }
 
 static unsigned recover(void *self, pal_step *step)
@@ -95,40 +96,40 @@ static void reset(void *self, const pal_body *body)
 
 static bool couple(void *self, pal_cliques *out)
 {
-    const pal_elastic_hexes *row = self;
-    *out = (pal_cliques){.n_item = row->n_hex, .n_corner = 8, .node = row->hexes->node};
+    const pal_elastic_hexes *hexes = self;
+    *out = (pal_cliques){.n_item = hexes->n_hex, .n_corner = 8, .node = hexes->hexes->node};
     return true;
 }
 
 static void linearise(void *self, const pal_body *body)
 {
-    pal_elastic_hexes *row = self;
-    pal_recovery_select(row->recovery, body);
+    pal_elastic_hexes *hexes = self;
+    pal_recovery_select(hexes->recovery, body);
     pal_node_order_load(body->node_order, body->d);
-    (row->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_linearise : pal_hex_corot_linearise)(row, body->node_order);
+    (hexes->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_linearise : pal_hex_corot_linearise)(hexes, body->node_order);
 }
 
 static void multiply(void *self, const pal_body *body, double k, const double *p, double *out)
 {
-    const pal_elastic_hexes *row = self;
+    const pal_elastic_hexes *hexes = self;
     pal_node_order_load(body->node_order, p);
-    (row->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_multiply : pal_hex_corot_multiply)(row, body->node_order, k);
+    (hexes->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_multiply : pal_hex_corot_multiply)(hexes, body->node_order, k);
     pal_node_order_add(body->node_order, out);
-    pal_recovery_multiply(row->recovery, k, p, out);
+    pal_recovery_multiply(hexes->recovery, k, p, out);
 }
 
 static void assemble(void *self, double k, pal_block_matrix *to)
 {
-    pal_elastic_hexes *row = self;
-    pal_hex_assemble(row, k, to);
-    pal_recovery_assemble(row->recovery, k, to);
+    pal_elastic_hexes *hexes = self;
+    pal_hex_assemble(hexes, k, to);
+    pal_recovery_assemble(hexes->recovery, k, to);
 }
 
 static void rotate(void *self, double *rotation)
 {
-    const pal_elastic_hexes *row = self;
-    pal_hex_rotate(row, rotation);
-    pal_recovery_rotate(row->recovery, rotation);
+    const pal_elastic_hexes *hexes = self;
+    pal_hex_rotate(hexes, rotation);
+    pal_recovery_rotate(hexes->recovery, rotation);
 }
 
 static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
@@ -144,18 +145,13 @@ static void stress(void *self, const pal_body *body, pal_stress_take *take, void
 static const pal_tangent tangent = {
     .couple = couple, .linearise = linearise, .multiply = multiply, .assemble = assemble, .rotate = rotate};
 
-const pal_effect pal_effect_hex_elastic = {.name = "hex_elastic",
-                                           .stage = PAL_STAGE_FORCE,
-                                           .internal = true,
-                                           .make = make,
-                                           .run = run,
-                                           .energy = energy,
-                                           .bounds.stiffness = stiffness,
-                                           .recovery.recover = recover,
-                                           .recovery.state = recovery,
-                                           .material = material,
-                                           .reset = reset,
-                                           .tangent = &tangent,
-                                           .inspect.measure = measure,
-                                           .inspect.fields = PAL_ELASTIC_FIELDS,
-                                           .inspect.stress = stress};
+const pal_effect pal_effect_hex_elastic = {
+    PAL_EFFECT("hex_elastic", FORCE),
+    .internal = true,
+    .energy = energy,
+    .bounds.stiffness = stiffness,
+    .recovery = {.recover = recover, .state = recovery},
+    .material = material,
+    .reset = reset,
+    .tangent = &tangent,
+    .inspect = {.measure = measure, .fields = PAL_ELASTIC_FIELDS, .stress = stress}};

@@ -34,35 +34,22 @@ typedef struct inflate {
     double *gradient; /* dV/dx_i, m^2, of the active nodes [n_node][3] */
 } inflate;
 
-static pal_err read_keys(inflate *row, pal_config_entry *item, pal_diagnostic *diag)
+static pal_err read_keys(inflate *state, pal_config_entry *item, pal_diagnostic *diag)
 {
     static const char *const names[] = {"pressure", "gas", "fluid"};
     int kind = PRESSURE;
     PAL_TRY(pal_entry_read_choice(item, "kind", names, 3, &kind, diag));
-    row->kind = (filling)kind;
-    row->ramp_s = 0.5;
-    row->stiff_Pa = row->kind == GAS ? 101325 : row->kind == FLUID ? 20000 : 0;
-    PAL_TRY(pal_entry_read_number(item, "pressure_Pa", -1e12, 1e12, &row->pressure_Pa, diag));
-    PAL_TRY(pal_entry_read_number(item, "ramp_s", 0, 1e6, &row->ramp_s, diag));
-    if (row->kind == GAS) PAL_TRY(pal_entry_read_number(item, "absolute_Pa", 0, 1e12, &row->stiff_Pa, diag));
-    if (row->kind == FLUID) PAL_TRY(pal_entry_read_number(item, "bulk_Pa", 0, 1e12, &row->stiff_Pa, diag));
+    state->kind = (filling)kind;
+    state->ramp_s = 0.5;
+    state->stiff_Pa = state->kind == GAS ? 101325 : state->kind == FLUID ? 20000 : 0;
+    PAL_TRY(pal_entry_read_number(item, "pressure_Pa", -1e12, 1e12, &state->pressure_Pa, diag));
+    PAL_TRY(pal_entry_read_number(item, "ramp_s", 0, 1e6, &state->ramp_s, diag));
+    if (state->kind == GAS) PAL_TRY(pal_entry_read_number(item, "absolute_Pa", 0, 1e12, &state->stiff_Pa, diag));
+    if (state->kind == FLUID) PAL_TRY(pal_entry_read_number(item, "bulk_Pa", 0, 1e12, &state->stiff_Pa, diag));
     return pal_entry_check_unused(item, diag);
 }
 
-/* from the first corner, so that a distant origin costs no accuracy */
-static double volume(const double *x, const int32_t *tri, int n_tri)
-{
-    double sum = 0;
-    for (int t = 0; t < n_tri; t++) {
-        double e[3][3], n[3];
-        for (int c = 0; c < 3; c++) pal_sub3(e[c], x + 3 * (size_t)tri[3 * t + c], x + 3 * (size_t)tri[0]);
-        pal_cross3(n, e[1], e[2]);
-        sum += pal_dot3(e[0], n);
-    }
-    return sum / 6;
-}
-
-static pal_err check_surface(inflate *row, const pal_config_entry *item, const pal_build *build)
+static pal_err check_surface(inflate *state, const pal_config_entry *item, const pal_build *build)
 {
     const pal_adaptive_surface *adaptive = build->body->model.adaptive;
     if (!adaptive)
@@ -73,13 +60,14 @@ static pal_err check_surface(inflate *row, const pal_config_entry *item, const p
     if (n_open > 0)
         return PAL_REFUSE(build->diag, "%s: \"%s\" needs a closed surface, this one has %d open edges", item->path,
                           item->name, n_open);
-    row->fine_m3 =
-        volume(levels->x, levels->face + 3 * (size_t)levels->first_face[last], pal_levels_n_face(levels, last));
+    state->fine_m3 = pal_surface_volume(&(pal_surface){.n_tri = pal_levels_n_face(levels, last),
+                                                       .x = levels->x,
+                                                       .tri = levels->face + 3 * (size_t)levels->first_face[last]});
     double size = build->body->length_scale_m,
            min_m3 = DBL_EPSILON * pal_levels_n_face(levels, last) * size * size * size;
-    if (!(fabs(row->fine_m3) > min_m3))
+    if (!(fabs(state->fine_m3) > min_m3))
         return PAL_REFUSE(build->diag, "%s: the surface encloses %g m3, which cannot be told from nothing", item->path,
-                          fabs(row->fine_m3));
+                          fabs(state->fine_m3));
     return PAL_ERR_OK;
 }
 
@@ -88,44 +76,44 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     inflate keys = {.revision = UINT64_MAX};
     PAL_TRY(check_surface(&keys, item, build));
     PAL_TRY(read_keys(&keys, item, build->diag));
-    inflate *row = PAL_NEW(build->arena, inflate, 1);
-    if (!row) return PAL_ERR_MEMORY;
-    *row = keys;
-    row->gradient = PAL_NEW(build->arena, double, 3 * (size_t)build->body->n_node);
-    if (!row->gradient) return PAL_ERR_MEMORY;
-    *self = row;
+    inflate *state = PAL_NEW(build->arena, inflate, 1);
+    if (!state) return PAL_ERR_MEMORY;
+    *state = keys;
+    state->gradient = PAL_NEW(build->arena, double, 3 * (size_t)build->body->n_node);
+    if (!state->gradient) return PAL_ERR_MEMORY;
+    *self = state;
     return PAL_ERR_OK;
 }
 
 /* V_rest of the drawn triangles; if they enclose almost nothing, that of the finest level */
-static void update_rest_volume(inflate *row, const pal_adaptive_surface *adaptive)
+static void update_rest_volume(inflate *state, const pal_adaptive_surface *adaptive)
 {
-    if (row->revision == adaptive->revision) return;
-    row->revision = adaptive->revision;
-    row->rest_m3 = volume(adaptive->levels.x, adaptive->tri, adaptive->n_tri);
-    if (!(row->rest_m3 / row->fine_m3 > 0.01)) row->rest_m3 = row->fine_m3;
+    if (state->revision == adaptive->revision) return;
+    state->revision = adaptive->revision;
+    state->rest_m3 = pal_surface_volume(&adaptive->surface);
+    if (!(state->rest_m3 / state->fine_m3 > 0.01)) state->rest_m3 = state->fine_m3;
 }
 
-/* Sets row->gradient of the active nodes at the present positions; returns V. On a closed surface the area normals
+/* Sets state->gradient of the active nodes at the present positions; returns V. On a closed surface the area normals
  * give the exact gradient, and V is a third of the sum of x . dV/dx */
-static double measure_volume(inflate *row, const pal_body *body)
+static double measure_volume(inflate *state, const pal_body *body)
 {
     const pal_adaptive_surface *adaptive = body->model.adaptive;
     const double *from = body->d + 3 * (size_t)pal_body_point(body, 0);
     double sum = 0;
     for (int k = 0; k < body->n_active; k++)
-        memset(row->gradient + 3 * (size_t)pal_body_point(body, k), 0, 3 * sizeof(double));
+        memset(state->gradient + 3 * (size_t)pal_body_point(body, k), 0, 3 * sizeof(double));
     for (int t = 0; t < adaptive->n_tri; t++) {
         const int32_t *tri = adaptive->tri + 3 * (size_t)t;
         double n[3];
         pal_normal3(n, body->d + 3 * (size_t)tri[0], body->d + 3 * (size_t)tri[1], body->d + 3 * (size_t)tri[2]);
-        for (int c = 0; c < 3; c++) pal_axpy3(row->gradient + 3 * (size_t)tri[c], 1.0 / 6, n);
+        for (int c = 0; c < 3; c++) pal_axpy3(state->gradient + 3 * (size_t)tri[c], 1.0 / 6, n);
     }
     for (int k = 0; k < body->n_active; k++) {
         size_t i = 3 * (size_t)pal_body_point(body, k);
         double arm[3];
         pal_sub3(arm, body->d + i, from);
-        sum += pal_dot3(arm, row->gradient + i);
+        sum += pal_dot3(arm, state->gradient + i);
     }
     return sum / 3;
 }
@@ -135,64 +123,64 @@ typedef struct answer {
     double value, slope, sum;
 } answer;
 
-static answer answer_to(const inflate *row, double s)
+static answer answer_to(const inflate *state, double s)
 {
-    const double low = row->kind == GAS ? 1 / (1.0 + PAL_LOAD_CAP_FACTOR) : 1 - PAL_LOAD_CAP_FACTOR;
-    const double at = fmin(fmax(s, low), row->kind == GAS ? INFINITY : 1 + PAL_LOAD_CAP_FACTOR);
+    const double low = state->kind == GAS ? 1 / (1.0 + PAL_LOAD_CAP_FACTOR) : 1 - PAL_LOAD_CAP_FACTOR;
+    const double at = fmin(fmax(s, low), state->kind == GAS ? INFINITY : 1 + PAL_LOAD_CAP_FACTOR);
     answer a = {0};
-    if (row->kind == GAS) a = (answer){1 / at - 1, s > low ? 1 / (s * s) : 0, log(at) - (at - 1)};
-    if (row->kind == FLUID) a = (answer){1 - at, s == at ? 1 : 0, -0.5 * (1 - at) * (1 - at)};
+    if (state->kind == GAS) a = (answer){1 / at - 1, s > low ? 1 / (s * s) : 0, log(at) - (at - 1)};
+    if (state->kind == FLUID) a = (answer){1 - at, s == at ? 1 : 0, -0.5 * (1 - at) * (1 - at)};
     a.sum += a.value * (s - at);
     return a;
 }
 
 /* sets s and the gradient at the present positions; returns p V_0/V_rest, the factor of the gradient in the force */
-static double push(inflate *row, const pal_body *body, double *s)
+static double push(inflate *state, const pal_body *body, double *s)
 {
-    update_rest_volume(row, body->model.adaptive);
-    *s = measure_volume(row, body) / row->rest_m3;
-    double p = row->share * row->pressure_Pa + row->stiff_Pa * answer_to(row, *s).value;
-    return p * fabs(row->fine_m3) / row->rest_m3;
+    update_rest_volume(state, body->model.adaptive);
+    *s = measure_volume(state, body) / state->rest_m3;
+    double p = state->share * state->pressure_Pa + state->stiff_Pa * answer_to(state, *s).value;
+    return p * fabs(state->fine_m3) / state->rest_m3;
 }
 
 static pal_err run(void *self, pal_step *step)
 {
-    inflate *row = self;
+    inflate *state = self;
     pal_body *body = step->body;
     double s;
-    row->share = pal_blend_toward(0, 1, step->time_s, row->ramp_s);
-    double p = push(row, body, &s);
+    state->share = pal_blend_toward(0, 1, step->time_s, state->ramp_s);
+    double p = push(state, body, &s);
     for (int k = 0; k < body->n_active; k++) {
         size_t i = 3 * (size_t)pal_body_point(body, k);
-        pal_axpy3(body->f + i, p, row->gradient + i);
+        pal_axpy3(body->f + i, p, state->gradient + i);
     }
     return PAL_ERR_OK;
 }
 
 static double energy(void *self, const pal_body *body)
 {
-    inflate *row = self;
+    inflate *state = self;
     double s;
-    push(row, body, &s);
-    double sum = row->share * row->pressure_Pa * (s - 1) + row->stiff_Pa * answer_to(row, s).sum;
-    return -fabs(row->fine_m3) * sum;
+    push(state, body, &s);
+    double sum = state->share * state->pressure_Pa * (s - 1) + state->stiff_Pa * answer_to(state, s).sum;
+    return -fabs(state->fine_m3) * sum;
 }
 
 /* Two parts. The change of p adds stiffness along g = dV/dx only: k g g', whose largest w^2, k times the sum of
  * g.g/m over the free nodes, is applied at every node; and the stiffness at constant p (pressure_bound.h) */
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
-    inflate *row = self;
+    inflate *state = self;
     const pal_adaptive_surface *adaptive = body->model.adaptive;
     double s, sum = 0;
-    (void)push(row, body, &s);
-    const answer now = answer_to(row, s);
-    double w = fabs(row->fine_m3 / row->rest_m3), k = row->stiff_Pa * now.slope * w / fabs(row->rest_m3);
+    (void)push(state, body, &s);
+    const answer now = answer_to(state, s);
+    double w = fabs(state->fine_m3 / state->rest_m3), k = state->stiff_Pa * now.slope * w / fabs(state->rest_m3);
     /* all of pressure_Pa, whatever the ramp: a limit is reused while nodes hardly move */
-    double p = w * (fabs(row->pressure_Pa) + row->stiff_Pa * fabs(now.value));
+    double p = w * (fabs(state->pressure_Pa) + state->stiff_Pa * fabs(now.value));
     for (int n = 0; n < body->n_active; n++) {
         int i = pal_body_point(body, n);
-        const double *g = row->gradient + 3 * (size_t)i;
+        const double *g = state->gradient + 3 * (size_t)i;
         if (!body->support[i]) sum += pal_dot3(g, g) / body->mass_kg[i];
     }
     for (int n = 0; n < body->n_active; n++) {
@@ -214,11 +202,5 @@ static void reset(void *self, const pal_body *body)
     ((inflate *)self)->share = 0;
 }
 
-const pal_effect pal_effect_inflate = {.name = "inflate",
-                                       .stage = PAL_STAGE_FORCE,
-                                       .make = make,
-                                       .run = run,
-                                       .energy = energy,
-                                       .bounds.stiffness = stiffness,
-                                       .reset = reset,
-                                       .sleep.settled_s = settled_s};
+const pal_effect pal_effect_inflate = {PAL_EFFECT("inflate", FORCE), .energy = energy, .bounds.stiffness = stiffness,
+                                       .reset = reset, .sleep.settled_s = settled_s};

@@ -93,5 +93,4 @@ static double settled_s(const void *self)
     return m->period_s > 0 ? INFINITY : m->rise_s;
 }
 
-const pal_effect pal_effect_moving_support = {
-    .name = "moving_support", .stage = PAL_STAGE_CONTACT, .make = make, .run = run, .sleep.settled_s = settled_s};
+const pal_effect pal_effect_moving_support = {PAL_EFFECT("moving_support", CONTACT), .sleep.settled_s = settled_s};

@@ -102,11 +102,5 @@ static void multiply(void *self, const pal_body *body, double k, const double *u
 
 static const pal_tangent tangent = {.multiply = multiply};
 
-const pal_effect pal_effect_penalty = {.name = "penalty",
-                                       .stage = PAL_STAGE_FORCE,
-                                       .make = make,
-                                       .run = run,
-                                       .energy = energy,
-                                       .bounds.stiffness = stiffness,
-                                       .material = material,
-                                       .tangent = &tangent};
+const pal_effect pal_effect_penalty = {PAL_EFFECT("penalty", FORCE), .energy = energy, .bounds.stiffness = stiffness,
+                                       .material = material, .tangent = &tangent};

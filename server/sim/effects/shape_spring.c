@@ -33,14 +33,14 @@ typedef struct hold {
 } hold;
 
 /* k' of the model's keys, and its ratio to E */
-static pal_err derive(shape_spring *row, pal_build *build)
+static pal_err derive(shape_spring *anchors, pal_build *build)
 {
     pal_config_entry model = build->def->model;
     double thickness_m = 0.003, k_0 = -1, young_Pa = build->def->material.young_Pa;
     PAL_TRY(pal_entry_read_number(&model, "thickness_m", 1e-9, 1e9, &thickness_m, build->diag));
     PAL_TRY(pal_entry_read_number(&model, "k_spring_N_m", 0, 1e60, &k_0, build->diag));
-    row->per_young = k_0 < 0 ? 0.3 * sqrt(0.75) * thickness_m : 0;
-    row->k_N_m = k_0 < 0 ? row->per_young * young_Pa : 0.3 * k_0;
+    anchors->per_young = k_0 < 0 ? 0.3 * sqrt(0.75) * thickness_m : 0;
+    anchors->k_N_m = k_0 < 0 ? anchors->per_young * young_Pa : 0.3 * k_0;
     return PAL_ERR_OK;
 }
 
@@ -51,40 +51,40 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     for (int i = 0; i < build->body->n_dof; i++) world |= build->body->support[i] != PAL_FREE;
     if (!build->body->model.adaptive)
         return PAL_REFUSE(build->diag, "%s: \"%s\" needs a body of model adaptive_springs", item->path, item->name);
-    shape_spring *row = PAL_NEW(build->arena, shape_spring, 1);
-    if (!row) return PAL_ERR_MEMORY;
-    row->c_Ns_m = -1;
-    if (!pal_entry_has(item, "k_N_m")) PAL_TRY(derive(row, build));
-    PAL_TRY(pal_entry_read_number(item, "k_N_m", 0, 1e60, &row->k_N_m, build->diag));
-    PAL_TRY(pal_entry_read_number(item, "c_Ns_m", 0, 1e60, &row->c_Ns_m, build->diag));
+    shape_spring *anchors = PAL_NEW(build->arena, shape_spring, 1);
+    if (!anchors) return PAL_ERR_MEMORY;
+    anchors->c_Ns_m = -1;
+    if (!pal_entry_has(item, "k_N_m")) PAL_TRY(derive(anchors, build));
+    PAL_TRY(pal_entry_read_number(item, "k_N_m", 0, 1e60, &anchors->k_N_m, build->diag));
+    PAL_TRY(pal_entry_read_number(item, "c_Ns_m", 0, 1e60, &anchors->c_Ns_m, build->diag));
     PAL_TRY(pal_entry_read_choice(item, "frame", frames, 2, &world, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
-    row->world = world;
-    row->frame.quat[0] = 1;
+    anchors->world = world;
+    anchors->frame.quat[0] = 1;
     PAL_TRY(pal_active_nodes_make(build->body, build->body_arena ? build->body_arena : build->arena));
-    *self = row;
+    *self = anchors;
     return PAL_ERR_OK;
 }
 
 /* constants over mass */
-static double stiff_1_s2(const shape_spring *row, const pal_adaptive_surface *adaptive)
+static double stiff_1_s2(const shape_spring *anchors, const pal_adaptive_surface *adaptive)
 {
-    return row->k_N_m * adaptive->shape_ramp / adaptive->level_mass_kg[0];
+    return anchors->k_N_m * adaptive->shape_ramp / adaptive->level_mass_kg[0];
 }
 
-static double damp_1_s(const shape_spring *row, const pal_adaptive_surface *adaptive)
+static double damp_1_s(const shape_spring *anchors, const pal_adaptive_surface *adaptive)
 {
     double m = adaptive->level_mass_kg[0];
-    return row->c_Ns_m < 0 ? 0.6 * sqrt(row->k_N_m / m) : row->c_Ns_m / m;
+    return anchors->c_Ns_m < 0 ? 0.6 * sqrt(anchors->k_N_m / m) : anchors->c_Ns_m / m;
 }
 
 /* frame: start from the last fit, and the new one; packed: of body->active_nodes */
-static hold find_hold(const shape_spring *row, const pal_body *body, pal_rigid_fit *frame, bool packed)
+static hold find_hold(const shape_spring *anchors, const pal_body *body, pal_rigid_fit *frame, bool packed)
 {
     hold h = {.R = {1, 0, 0, 0, 1, 0, 0, 0, 1},
-              .k = stiff_1_s2(row, body->model.adaptive),
-              .c = damp_1_s(row, body->model.adaptive)};
-    if (row->world) return h;
+              .k = stiff_1_s2(anchors, body->model.adaptive),
+              .c = damp_1_s(anchors, body->model.adaptive)};
+    if (anchors->world) return h;
     double at[3];
     if (packed)
         pal_adaptive_fit_rigid_active(body->model.adaptive, body->active_nodes, frame);
@@ -109,11 +109,11 @@ static inline void strain(const hold *h, const double x[3], const double rest[3]
 
 static pal_err compute_forces(void *self, pal_step *step)
 {
-    shape_spring *row = self;
+    shape_spring *anchors = self;
     const pal_body *body = step->body;
     pal_active_nodes *pack = body->active_nodes;
-    const hold h = find_hold(row, body, &row->frame, true);
-    if (row->world) {
+    const hold h = find_hold(anchors, body, &anchors->frame, true);
+    if (anchors->world) {
         for (int k = 0; k < body->n_active; k++) {
             pal_quad rest = pack->rest[k], x = pal_v8_low(pack->xv[k]), v = pal_v8_high(pack->xv[k]);
             const double m = rest[3];
@@ -139,9 +139,9 @@ static pal_err run(void *self, pal_step *step)
 
 static double energy(void *self, const pal_body *body)
 {
-    const shape_spring *row = self;
-    pal_rigid_fit frame = row->frame;
-    const hold h = find_hold(row, body, &frame, false);
+    const shape_spring *anchors = self;
+    pal_rigid_fit frame = anchors->frame;
+    const hold h = find_hold(anchors, body, &frame, false);
     double sum = 0, u[3];
     for (int k = 0; k < body->n_active; k++) {
         size_t i = (size_t)pal_body_point(body, k);
@@ -168,9 +168,9 @@ static void damping(void *self, const pal_body *body, double *bound_Ns_m)
 
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
 {
-    shape_spring *row = self;
+    shape_spring *anchors = self;
     (void)body, (void)diag;
-    if (row->per_young > 0) row->k_N_m = row->per_young * to->young_Pa;
+    if (anchors->per_young > 0) anchors->k_N_m = anchors->per_young * to->young_Pa;
     return PAL_ERR_OK;
 }
 
@@ -180,13 +180,9 @@ static void reset(void *self, const pal_body *body)
     ((shape_spring *)self)->frame = (pal_rigid_fit){.quat = {1}};
 }
 
-const pal_effect pal_effect_shape_spring = {.name = "shape_spring",
-                                            .stage = PAL_STAGE_FORCE,
-                                            .make = make,
-                                            .run = run,
+const pal_effect pal_effect_shape_spring = {PAL_EFFECT("shape_spring", FORCE),
                                             .compute_forces = compute_forces,
                                             .energy = energy,
-                                            .bounds.stiffness = stiffness,
-                                            .bounds.damping = damping,
+                                            .bounds = {.stiffness = stiffness, .damping = damping},
                                             .material = material,
                                             .reset = reset};

@@ -51,5 +51,4 @@ static void reset(void *self, const pal_body *body)
     evaluate(own);
 }
 
-const pal_effect pal_effect_skin_output = {
-    .name = "skin_output", .stage = PAL_STAGE_OUTPUT, .make = make, .run = run, .reset = reset};
+const pal_effect pal_effect_skin_output = {PAL_EFFECT("skin_output", OUTPUT), .reset = reset};

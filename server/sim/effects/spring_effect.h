@@ -35,15 +35,10 @@
         if (c_Js > 0)                                                                                                  \
             pal_spring_bound(self, body->node_order, body->d, bound_kernel, N_CORNER, c_Js, false, bound_Ns_m);        \
     }                                                                                                                  \
-    const pal_effect pal_effect_##NAME = {.name = #NAME,                                                               \
-                                          .stage = PAL_STAGE_FORCE,                                                    \
+    const pal_effect pal_effect_##NAME = {PAL_EFFECT(#NAME, FORCE),                                                    \
                                           .internal = true,                                                            \
-                                          .make = make,                                                                \
-                                          .run = run,                                                                  \
                                           .energy = energy,                                                            \
-                                          .bounds.stiffness = stiffness,                                               \
-                                          .bounds.damping = damping,                                                   \
-                                          .recovery.springs = springs,                                                 \
-                                          .recovery.recover = pal_spring_recover,                                      \
+                                          .bounds = {.stiffness = stiffness, .damping = damping},                      \
+                                          .recovery = {.springs = springs, .recover = pal_spring_recover},             \
                                           .material = pal_spring_set_material};
 #endif

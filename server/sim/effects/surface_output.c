@@ -127,5 +127,4 @@ static pal_err run(void *self, pal_step *step)
     return PAL_ERR_OK;
 }
 
-const pal_effect pal_effect_surface_output = {
-    .name = "surface_output", .stage = PAL_STAGE_OUTPUT, .make = make, .run = run, .reset = reset};
+const pal_effect pal_effect_surface_output = {PAL_EFFECT("surface_output", OUTPUT), .reset = reset};

@@ -10,10 +10,10 @@
 #include "server/sim/core/force_cache.h"
 #include "server/sim/elements/elastic_tet.h"
 
-typedef struct tet_row {
+typedef struct tet_elastic {
     pal_elastic_tets whole;      /* first member: tests read it                     */
     pal_force_cache force_cache; /* under an implicit solver: of the elements alone */
-} tet_row;
+} tet_elastic;
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
@@ -35,75 +35,75 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     options.tet = own ? body->element : body->tets->tet;
     options.n_tet = own ? body->n_element : body->tets->n_tet;
     options.fill = own && fill ? body->fill : NULL;
-    tet_row *row = PAL_NEW(build->arena, tet_row, 1);
-    if (!row) return PAL_ERR_MEMORY;
-    *self = row;
-    PAL_TRY(pal_elastic_tets_make(&options, build, &row->whole));
+    tet_elastic *tets = PAL_NEW(build->arena, tet_elastic, 1);
+    if (!tets) return PAL_ERR_MEMORY;
+    *self = tets;
+    PAL_TRY(pal_elastic_tets_make(&options, build, &tets->whole));
     if (!body->implicit) return PAL_ERR_OK;
-    row->whole.counted = &row->force_cache;
-    return pal_force_cache_make(body->n_node, build->arena, &row->force_cache);
+    tets->whole.counted = &tets->force_cache;
+    return pal_force_cache_make(body->n_node, build->arena, &tets->force_cache);
 }
 
 static pal_err run(void *self, pal_step *step)
 {
-    tet_row *row = self;
+    tet_elastic *tets = self;
     pal_body *body = step->body;
-    pal_recovery_select(row->whole.recovery, body);
-    if (pal_force_cache_matches(&row->force_cache, body->d))
-        pal_force_cache_add(&row->force_cache, body->f);
+    pal_recovery_select(tets->whole.recovery, body);
+    if (pal_force_cache_matches(&tets->force_cache, body->d))
+        pal_force_cache_add(&tets->force_cache, body->f);
     else
-        pal_elastic_tets_force(&row->whole, body->d, body->f);
-    pal_recovery_add_forces(row->whole.recovery, body);
+        pal_elastic_tets_force(&tets->whole, body->d, body->f);
+    pal_recovery_add_forces(tets->whole.recovery, body);
     return PAL_ERR_OK;
 }
 
-static double elements_energy(tet_row *row, const double *d)
+static double elements_energy(tet_elastic *tets, const double *d)
 {
-    if (pal_force_cache_matches(&row->force_cache, d)) return row->force_cache.energy_J;
-    double sum = pal_elastic_tets_energy(&row->whole, d, pal_force_cache_begin(&row->force_cache, d));
-    return pal_force_cache_commit(&row->force_cache, sum);
+    if (pal_force_cache_matches(&tets->force_cache, d)) return tets->force_cache.energy_J;
+    double sum = pal_elastic_tets_energy(&tets->whole, d, pal_force_cache_begin(&tets->force_cache, d));
+    return pal_force_cache_commit(&tets->force_cache, sum);
 }
 
 static double energy(void *self, const pal_body *body)
 {
-    tet_row *row = self;
-    pal_recovery_select(row->whole.recovery, body);
-    return elements_energy(row, body->d) + pal_recovery_energy(row->whole.recovery, body->d, NULL);
+    tet_elastic *tets = self;
+    pal_recovery_select(tets->whole.recovery, body);
+    return elements_energy(tets, body->d) + pal_recovery_energy(tets->whole.recovery, body->d, NULL);
 }
 
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
-    tet_row *row = self;
-    pal_recovery_select(row->whole.recovery, body);
-    pal_elastic_tets_bound(&row->whole, body->d, bound_N_m);
-    pal_recovery_bound(row->whole.recovery, bound_N_m);
+    tet_elastic *tets = self;
+    pal_recovery_select(tets->whole.recovery, body);
+    pal_elastic_tets_bound(&tets->whole, body->d, bound_N_m);
+    pal_recovery_bound(tets->whole.recovery, bound_N_m);
 }
 
 static unsigned recover(void *self, pal_step *step)
 {
-    return pal_recovery_update(((tet_row *)self)->whole.recovery, step);
+    return pal_recovery_update(((tet_elastic *)self)->whole.recovery, step);
 }
 
 static pal_recovery *recovery(void *self)
 {
-    return ((tet_row *)self)->whole.recovery;
+    return ((tet_elastic *)self)->whole.recovery;
 }
 
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
 {
-    tet_row *row = self;
+    tet_elastic *tets = self;
     (void)body, (void)diag;
-    pal_elastic_tets_material(&row->whole, to);
-    pal_force_cache_invalidate(&row->force_cache);
+    pal_elastic_tets_material(&tets->whole, to);
+    pal_force_cache_invalidate(&tets->force_cache);
     return PAL_ERR_OK;
 }
 
 static void reset(void *self, const pal_body *body)
 {
-    tet_row *row = self;
+    tet_elastic *tets = self;
     (void)body;
-    pal_elastic_tets_reset(&row->whole);
-    pal_force_cache_invalidate(&row->force_cache);
+    pal_elastic_tets_reset(&tets->whole);
+    pal_force_cache_invalidate(&tets->force_cache);
 }
 
 static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
@@ -118,54 +118,49 @@ static void stress(void *self, const pal_body *body, pal_stress_take *take, void
 
 static bool couple(void *self, pal_cliques *out)
 {
-    const pal_elastic_tets_options *of = &((tet_row *)self)->whole.options;
+    const pal_elastic_tets_options *of = &((tet_elastic *)self)->whole.options;
     *out = (pal_cliques){.n_item = of->n_tet, .n_corner = of->n_corner, .node = of->tet};
     return true;
 }
 
 static void linearise(void *self, const pal_body *body)
 {
-    tet_row *row = self;
-    pal_recovery_select(row->whole.recovery, body);
-    pal_elastic_tets_linearise(&row->whole, body->d);
+    tet_elastic *tets = self;
+    pal_recovery_select(tets->whole.recovery, body);
+    pal_elastic_tets_linearise(&tets->whole, body->d);
 }
 
 static void multiply(void *self, const pal_body *body, double k, const double *p, double *out)
 {
     (void)body;
-    tet_row *row = self;
-    pal_elastic_tets_multiply(&row->whole, k, p, out);
-    pal_recovery_multiply(row->whole.recovery, k, p, out);
+    tet_elastic *tets = self;
+    pal_elastic_tets_multiply(&tets->whole, k, p, out);
+    pal_recovery_multiply(tets->whole.recovery, k, p, out);
 }
 
 static void assemble(void *self, double k, pal_block_matrix *to)
 {
-    tet_row *row = self;
-    pal_elastic_tets_assemble(&row->whole, k, to);
-    pal_recovery_assemble(row->whole.recovery, k, to);
+    tet_elastic *tets = self;
+    pal_elastic_tets_assemble(&tets->whole, k, to);
+    pal_recovery_assemble(tets->whole.recovery, k, to);
 }
 
 static void rotate(void *self, double *rotation)
 {
     pal_elastic_tets_rotate(self, rotation);
-    pal_recovery_rotate(((tet_row *)self)->whole.recovery, rotation);
+    pal_recovery_rotate(((tet_elastic *)self)->whole.recovery, rotation);
 }
 
 static const pal_tangent tangent = {
     .couple = couple, .linearise = linearise, .multiply = multiply, .assemble = assemble, .rotate = rotate};
 
-const pal_effect pal_effect_tet_elastic = {.name = "tet_elastic",
-                                           .stage = PAL_STAGE_FORCE,
-                                           .internal = true,
-                                           .make = make,
-                                           .run = run,
-                                           .energy = energy,
-                                           .bounds.stiffness = stiffness,
-                                           .recovery.recover = recover,
-                                           .recovery.state = recovery,
-                                           .material = material,
-                                           .reset = reset,
-                                           .tangent = &tangent,
-                                           .inspect.measure = measure,
-                                           .inspect.fields = PAL_ELASTIC_FIELDS,
-                                           .inspect.stress = stress};
+const pal_effect pal_effect_tet_elastic = {
+    PAL_EFFECT("tet_elastic", FORCE),
+    .internal = true,
+    .energy = energy,
+    .bounds.stiffness = stiffness,
+    .recovery = {.recover = recover, .state = recovery},
+    .material = material,
+    .reset = reset,
+    .tangent = &tangent,
+    .inspect = {.measure = measure, .fields = PAL_ELASTIC_FIELDS, .stress = stress}};

@@ -17,20 +17,20 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     PAL_TRY(pal_spring_set_check(item, build));
     const pal_tets *tets = build->body->tets;
-    pal_spring_set *row = PAL_NEW(build->arena, pal_spring_set, 1);
+    pal_spring_set *set = PAL_NEW(build->arena, pal_spring_set, 1);
     int32_t *tet = malloc(4 * sizeof *tet * ((size_t)tets->n_tet + 1));
     int n = 0;
-    for (int t = 0; t < tets->n_tet && row && tet; t++) {
+    for (int t = 0; t < tets->n_tet && set && tet; t++) {
         const double *x[PAL_CORNERS];
         for (int c = 0; c < 4; c++) x[c] = build->body->x_rest + 3 * (size_t)tets->tet[4 * t + c];
         if (pal_spring_tet_quality(x) < PAL_SPRING_SLIVER) continue;
         memcpy(tet + 4 * (size_t)n++, tets->tet + 4 * (size_t)t, 4 * sizeof *tet);
     }
     double h = build->body->edge_m;
-    pal_err err = row && tet ? pal_spring_set_make(PAL_SPRING_VOLUME, item, build, tet, n, 6e-6 * h * h * h, row)
+    pal_err err = set && tet ? pal_spring_set_make(PAL_SPRING_VOLUME, item, build, tet, n, 6e-6 * h * h * h, set)
                              : PAL_ERR_MEMORY;
     free(tet);
-    *self = row;
+    *self = set;
     return err;
 }
 

@@ -306,13 +306,6 @@ static double reach_m(const void *self, const pal_tool *tool)
 
 static const pal_tangent tangent = {.multiply = pal_grasp_multiply, .settle = pal_grasp_settle};
 
-const pal_effect pal_effect_tool_grasp = {.name = "tool_grasp",
-                                          .stage = PAL_STAGE_CONTACT,
-                                          .make = make,
-                                          .run = run,
-                                          .material = material,
-                                          .reset = reset,
-                                          .transfer = transfer,
-                                          .destroy = destroy,
-                                          .sleep.reach_m = reach_m,
-                                          .tangent = &tangent};
+const pal_effect pal_effect_tool_grasp = {
+    PAL_EFFECT("tool_grasp", CONTACT), .material = material, .reset = reset, .transfer = transfer, .destroy = destroy,
+    .sleep.reach_m = reach_m,          .tangent = &tangent};

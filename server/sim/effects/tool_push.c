@@ -224,11 +224,6 @@ static void multiply(void *self, const pal_body *body, double k, const double *p
     pal_contact_springs_multiply(((pal_push *)self)->springs, k, p, out);
 }
 
-static bool settle(void *self, pal_step *step, const double *moved, bool last)
-{
-    return pal_push_settle(self, step, moved, last);
-}
-
 static void transfer(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
 {
     pal_push *push = self, *old = (pal_push *)(uintptr_t)before; /* its points use the scratch memory of forces */
@@ -253,12 +248,9 @@ static double reach_m(const void *self, const pal_tool *tool)
     return tool->radius_m + pal_push_near_m(push, tool->radius_m);
 }
 
-static const pal_tangent tangent = {.multiply = multiply, .settle = settle};
+static const pal_tangent tangent = {.multiply = multiply, .settle = pal_push_settle};
 
-const pal_effect pal_effect_tool_push = {.name = "tool_push",
-                                         .stage = PAL_STAGE_CONTACT,
-                                         .make = make,
-                                         .run = run,
+const pal_effect pal_effect_tool_push = {PAL_EFFECT("tool_push", CONTACT),
                                          .material = material,
                                          .reset = reset,
                                          .transfer = transfer,

@@ -3,6 +3,7 @@
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
+#include "server/sim/core/rigid_motion.h"
 #include "server/sim/core/step_guard.h"
 #include "server/sim/core/sums.h"
 #include "server/sim/implicit/tuning.h"
@@ -250,15 +251,12 @@ static void keep_momentum(pal_implicit *core)
 static void free_mean(const pal_implicit *core, const double *a, const double *b, double mean[3])
 {
     const pal_body *body = core->system.body;
-    double mass = 0;
+    double less[3] = {0};
     pal_set3(mean, 0, 0, 0);
     if (core->system.n_free < body->n_dof) return;
-    for (int i = 0; i < body->n_dof; i++) {
-        pal_axpy3(mean, body->mass_kg[i], a + 3 * i);
-        if (b) pal_axpy3(mean, -body->mass_kg[i], b + 3 * i);
-        mass += body->mass_kg[i];
-    }
-    if (mass > 0) pal_scale3(mean, 1 / mass, mean);
+    pal_rigid_centre(body->n_dof, body->mass_kg, a, mean);
+    if (b) pal_rigid_centre(body->n_dof, body->mass_kg, b, less);
+    pal_sub3(mean, mean, less);
 }
 
 /* The longest of n moves without the mean motion, m/s; *n_long: how many are longer than max */
@@ -525,32 +523,6 @@ static void update_probed(pal_implicit *core, pal_step *step)
         (void)pal_compliance_solver_factor(&core->compliance, &core->blocks, true);
 }
 
-<<<<<<< HEAD
-/* forces that have no energy, such as those of inverted elements with fallback rotations, may gain energy in a cycle
- * for ever; an inverted body needs a few such sub-steps to recover */
-static bool is_cycling(pal_implicit *core, double dt_s)
-{
-    const double limit_s = PAL_PAUSE_S * (1 + 1e-9);
-    core->steady_s = core->energy_rose ? 0 : core->steady_s + dt_s;
-    if (core->energy_rose) core->energy_rise_s += dt_s;
-    if (core->steady_s > limit_s) core->energy_rise_s = 0;
-    return core->energy_rose && core->energy_rise_s > limit_s;
-}
-
-/* the body stops where it was; a body without supports keeps its momentum */
-static void stop(pal_implicit *core, double dt_s)
-{
-    pal_body *body = core->system.body;
-    double mean[3];
-    free_mean(core, body->v, NULL, mean);
-    for (int i = 0; i < body->n_dof; i++) {
-        for (int c = 0; c < 3; c++) body->x[3 * i + c] = core->x0[3 * i + c] + dt_s * mean[c];
-        pal_copy3(body->v + 3 * i, mean);
-    }
-}
-
-=======
->>>>>>> recovery
 void pal_implicit_end(pal_implicit *core, pal_step *step)
 {
     pal_body *body = core->system.body;
@@ -560,7 +532,7 @@ void pal_implicit_end(pal_implicit *core, pal_step *step)
         pal_body_update_nodes(body);
         return;
     }
-    core->rose_s = core->energy_rose ? PAL_ENERGY_RISE_S : fmax(0, core->rose_s - step->dt_s);
+    core->rose_s = core->energy_rose ? PAL_PAUSE_S : fmax(0, core->rose_s - step->dt_s);
     pal_body_update_nodes(body);
     pal_warp_step(&core->warp, step->dt_s);
     pal_warp_step(&core->compliance.warp, step->dt_s);

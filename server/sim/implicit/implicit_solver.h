@@ -53,7 +53,7 @@ typedef struct pal_implicit {
     bool guarded;                /* energy is checked, see above */
     bool sound;                  /* the last check found x and v finite */
     bool energy_rose;            /* the energy rose in this sub-step */
-    double rose_s;               /* what is left of PAL_ENERGY_RISE_S since the last such sub-step */
+    double rose_s;               /* what is left of PAL_PAUSE_S since the last such sub-step */
     int max_cg;                  /* max iterations in one solve of this sub-step */
     uint64_t sampled;            /* material revision of the body at the factor (dofs.h) */
     bool probing;                /* the matrices of an interpolated body are being rebuilt */

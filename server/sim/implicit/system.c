@@ -224,8 +224,7 @@ static void find_inner_forces(const pal_system *system)
     pal_step step = {.body = body, .force = system->force, .n_force = system->n_force};
     pal_system_interpolate(system);
     memset(body->f, 0, 3 * sizeof(double) * (size_t)body->n_node);
-    for (int i = 0; i < system->n_force; i++)
-        if (system->force[i].effect->internal) (void)system->force[i].effect->run(system->force[i].self, &step);
+    (void)pal_run_forces(&step, PAL_FORCES_INTERNAL);
     if (body->interpolation) pal_system_restrict(body, body->f, body->g);
 }
 
@@ -309,12 +308,7 @@ bool pal_system_settle_contact(const pal_system *system, pal_step *step, const d
 
 double pal_system_energy(const pal_system *system)
 {
-    double sum = 0;
-    for (int i = 0; i < system->n_force; i++) {
-        const pal_component *component = &system->force[i];
-        if (component->effect->energy) sum += component->effect->energy(component->self, system->body);
-    }
-    return sum;
+    return pal_components_energy_J(system->force, system->n_force, system->body);
 }
 
 /* ---- supports ---- */

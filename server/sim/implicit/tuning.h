@@ -14,21 +14,11 @@
 /* of 10 E h^2 (load_cap_N), the same for a body without loads: such forces move a node by the rounding of positions
  * (tests/stability/test_rest_after_cases.c) */
 #define PAL_UNLOADED_FLOOR 1e-11
-<<<<<<< HEAD
-/* s, simulated. Total of sub-steps that gained energy in spite of all iterations, before the body has to stop in such:
- * an inverted body needs a few of them to recover; they are forgotten after as much time without one
- * (tests/stability/test_fem_cases.c). Between two refreshed factors, each of which takes the spare thread and a copy of
- * the matrix; with 0.5 s a material edit gains energy (tests/sim/solvers/test_solve_report.c,
- * stability/test_fem_numbers.c) */
+/* s, simulated. After a sub-step that gained energy in spite of all iterations sdirk2 takes backward Euler for as long:
+ * a crushed body gains in one of thirty sub-steps (tests/stability/test_fem_shapes.c). Between two refreshed factors,
+ * each of which takes the spare thread and a copy of the matrix; with 0.5 s a material edit gains energy
+ * (tests/sim/solvers/test_solve_report.c, stability/test_fem_numbers.c) */
 #define PAL_PAUSE_S 0.33
-=======
-/* s after a sub-step that gained energy in spite of all iterations in which sdirk2 takes backward Euler: a crushed body
- * gains in one of thirty sub-steps (tests/stability/test_fem_shapes.c) */
-#define PAL_ENERGY_RISE_S 0.5
-/* s, simulated, between two refreshed factors: each takes the spare thread and a copy of the matrix
- * (tests/sim/solvers/test_solve_report.c) */
-#define PAL_REFRESH_PAUSE_S 0.33
->>>>>>> recovery
 /* displacement over an element's edge of a difference of forces that gives a product with the true stiffness: far above
  * the rounding of forces in single precision, far below a change of stiffness (tests/sim/implicit, tests/sim/solvers)
  */

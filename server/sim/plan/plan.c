@@ -109,6 +109,11 @@ static pal_err make_components(pal_plan_requests *s, pal_component *list, int *n
     for (int i = 0; i < s->n_request; i++) s->build.body->implicit |= s->request[i].effect->implicit;
     for (int i = 0; i < s->n_request; i++) {
         const pal_effect *effect = s->request[i].effect;
+        if (effect->moves_nodes && s->build.body->interpolation)
+            return PAL_REFUSE(s->build.diag,
+                              "%s: \"%s\" moves nodes, those of this body are carried by control points; take "
+                              "\"central_cg\" or \"implicit_euler\"",
+                              s->request[i].item->path, effect->name);
         if (s->build.body->implicit && effect->internal && !effect->tangent)
             return PAL_REFUSE(s->build.diag, "body \"%s\": row \"%s\" has no tangent, which its implicit solver needs",
                               name, effect->name);

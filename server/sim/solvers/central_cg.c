@@ -483,11 +483,5 @@ static void report(const void *self, pal_solve_report *out)
     out->factor_nonzeros = solver->factored ? solver->envelope.start[solver->envelope.n] : 0;
 }
 
-const pal_effect pal_effect_central_cg = {.name = "central_cg",
-                                          .stage = PAL_STAGE_SOLVE,
-                                          .make = make,
-                                          .run = run,
-                                          .bounds.limit = limit,
-                                          .material = material,
-                                          .reset = reset,
-                                          .inspect.report = report};
+const pal_effect pal_effect_central_cg = {PAL_EFFECT("central_cg", SOLVE), .bounds.limit = limit, .material = material,
+                                          .reset = reset, .inspect.report = report};

@@ -103,7 +103,7 @@ static pal_err find_forces(const rk4 *solver, pal_step *step)
     pal_body *body = step->body;
     if (solver->packed) {
         memcpy(body->active_nodes->f, solver->load, sizeof *solver->load * (size_t)body->n_active);
-        return pal_run_forces(step, true);
+        return pal_run_forces(step, PAL_FORCES_PACKED);
     }
     store_motion(body);
     PAL_TRY(pal_assemble_forces(step));
@@ -128,14 +128,14 @@ static bool is_known(const rk4 *solver, const pal_step *step)
     return step->sub != 0 || !pal_guard_has_bounds(step->contact, step->n_contact);
 }
 
-/* max over free nodes of row sums of stiffness over mass */
-static double max_stiff(const rk4 *solver, const pal_body *body)
+/* max over free nodes of row sums [n_dof] over mass */
+static double max_over_mass(const double *sum, const pal_body *body)
 {
     double max = 0;
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        double omega2 = solver->stiff[i] / body->mass_kg[i];
-        if (!body->support[i] && omega2 > max) max = omega2;
+        double ratio = sum[i] / body->mass_kg[i];
+        if (!body->support[i] && ratio > max) max = ratio;
     }
     return max;
 }
@@ -143,14 +143,10 @@ static double max_stiff(const rk4 *solver, const pal_body *body)
 /* 1 for a state and row sums that are finite, else NaN */
 static double one_if_finite(const rk4 *solver, const pal_body *body)
 {
-    double sum = 0;
-    for (int k = 0; k < body->n_active; k++) {
-        int i = pal_body_point(body, k);
-        const double *x = body->x + 3 * (size_t)i, *v = body->v + 3 * (size_t)i;
-        sum += 0 * solver->stiff[i] + 0 * solver->damp[i];
-        for (int q = 0; q < 3; q++) sum += 0 * x[q] + 0 * v[q];
-    }
-    return 1 + sum;
+    double one = pal_body_finite(body) ? 1 : NAN;
+    for (int k = 0; k < body->n_active; k++)
+        one += 0 * solver->stiff[pal_body_point(body, k)] + 0 * solver->damp[pal_body_point(body, k)];
+    return one;
 }
 
 /* ---- the Lanczos bound; vectors are displacements of active nodes [n_active][3] ---- */
@@ -265,18 +261,13 @@ static double limit(void *self, pal_step *step)
         solver->stiff[i] = solver->damp[i] = 0;
     }
     pal_guard_add_bounds(step->contact, step->n_contact, body, solver->stiff, solver->damp);
-    double contact2 = max_stiff(solver, body);
+    double contact2 = max_over_mass(solver->stiff, body);
     pal_guard_add_bounds(step->force, step->n_force, body, solver->stiff, solver->damp);
-    /* the largest of omega^2 and c */
-    double max2 = max_stiff(solver, body), max = 0;
+    double max2 = max_over_mass(solver->stiff, body);
     solver->limit_s = one_if_finite(solver, body);
     if (solver->limit_s == 1) max2 = fmin(max2, bound_force(solver, step, max2) + contact2);
-    for (int k = 0; k < body->n_active; k++) {
-        int i = pal_body_point(body, k);
-        double c = solver->damp[i] / body->mass_kg[i];
-        if (!body->support[i] && c > max) max = c;
-    }
-    max = fmax(sqrt(max2), max);
+    /* the larger of omega and c */
+    const double max = fmax(sqrt(max2), max_over_mass(solver->damp, body));
     solver->limit_s *= max > 0 ? solver->reach / max : INFINITY;
     if (!solver->sharp_known || solver->n_since == 0) solver->moved_m = 0;
     solver->revision = body->display.revision;
@@ -476,11 +467,6 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     double safety = 0.9;
     PAL_TRY(pal_entry_read_number(item, "safety", 0.01, 0.96, &safety, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
-    if (build->body->interpolation)
-        return PAL_REFUSE(build->diag,
-                          "%s: \"rk4\" moves nodes, those of this body are carried by control points; take "
-                          "\"central_cg\" or \"implicit_euler\"",
-                          item->path);
     const pal_body *body = build->body;
     rk4 *solver = PAL_NEW(build->arena, rk4, 1);
     if (!solver) return PAL_ERR_MEMORY;
@@ -505,5 +491,5 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     return PAL_ERR_OK;
 }
 
-const pal_effect pal_effect_rk4 = {
-    .name = "rk4", .stage = PAL_STAGE_SOLVE, .make = make, .run = run, .bounds.limit = limit, .reset = reset};
+const pal_effect pal_effect_rk4 = {PAL_EFFECT("rk4", SOLVE), .moves_nodes = true, .bounds.limit = limit,
+                                   .reset = reset};

@@ -262,27 +262,12 @@ static void destroy(void *self)
 
 /* ---- forces and energy ---- */
 
-static pal_err run_components(pal_step *step, bool internal)
-{
-    uint64_t before = pal_clock_ns();
-    for (int i = 0; i < step->n_force; i++) {
-        pal_component *force = &step->force[i];
-        if (force->effect->internal != internal || force->effect->drag) continue;
-        force->n_run++;
-        PAL_TRY(force->effect->run(force->self, step));
-        uint64_t now = pal_clock_ns();
-        force->spent_ns += now - before;
-        before = now;
-    }
-    return PAL_ERR_OK;
-}
-
 /* external loads at the beginning of the step */
 static pal_err find_external_force(static_newton *solver, pal_step *step)
 {
     pal_body *body = solver->system.body;
     memcpy(body->f, body->load, 3 * sizeof(double) * (size_t)body->n_node);
-    PAL_TRY(run_components(step, false));
+    PAL_TRY(pal_run_forces(step, PAL_FORCES_EXTERNAL));
     pal_system_restrict(body, body->f, solver->external_force);
     return PAL_ERR_OK;
 }
@@ -302,7 +287,7 @@ static pal_err find_residual(static_newton *solver, pal_step *step, double *size
     pal_system_interpolate(&solver->system);
     if (body->interpolation) memset(body->f, 0, 3 * sizeof(double) * (size_t)body->n_node);
     for (int i = 0; i < solver->cg.n; i++) body->g[i] = part * solver->external_force[i];
-    PAL_TRY(run_components(step, true));
+    PAL_TRY(pal_run_forces(step, PAL_FORCES_INTERNAL));
     if (body->interpolation) pal_interpolation_apply_transpose(body->interpolation, body->f, body->g);
     memcpy(r, body->g, pal_body_bytes3(solver->system.body));
     if (solver->system.has_contact) {
@@ -603,10 +588,7 @@ static void report(const void *self, pal_solve_report *out)
     pal_compliance_solver_report(&solver->compliance, &solver->system, &solver->warp, out);
 }
 
-const pal_effect pal_effect_static_newton = {.name = "static_newton",
-                                             .stage = PAL_STAGE_SOLVE,
-                                             .make = make,
-                                             .run = run,
+const pal_effect pal_effect_static_newton = {PAL_EFFECT("static_newton", SOLVE),
                                              .bounds.limit = limit,
                                              .material = material,
                                              .reset = reset,

@@ -31,11 +31,6 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     double safety = 0.5;
     PAL_TRY(pal_entry_read_number(item, "safety", 0.01, 0.9, &safety, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
-    if (build->body->interpolation)
-        return PAL_REFUSE(build->diag,
-                          "%s: \"verlet\" moves nodes, those of this body are carried by control points; take "
-                          "\"central_cg\" or \"implicit_euler\"",
-                          item->path);
     verlet *solver = PAL_NEW(build->arena, verlet, 1);
     if (!solver) return PAL_ERR_MEMORY;
     if (!PAL_NEW_DOUBLES(build->arena, build->body->n_dof, &solver->stiff, &solver->damp)) return PAL_ERR_MEMORY;
@@ -121,5 +116,5 @@ static void reset(void *self, const pal_body *body)
     ((verlet *)self)->known = false;
 }
 
-const pal_effect pal_effect_verlet = {
-    .name = "verlet", .stage = PAL_STAGE_SOLVE, .make = make, .run = run, .bounds.limit = limit, .reset = reset};
+const pal_effect pal_effect_verlet = {PAL_EFFECT("verlet", SOLVE), .moves_nodes = true, .bounds.limit = limit,
+                                      .reset = reset};

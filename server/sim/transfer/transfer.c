@@ -121,12 +121,7 @@ static void add_point(const bare *in, const double x[3], pal_interpolation_build
     int n = body->n_corner == 8 || body->n_corner == 10 ? body->n_corner : 4;
     int e = pal_locate_point(in->locate, x, local, NULL);
     hold_near(n, local);
-    if (n == 8)
-        pal_hex_shape(local, weight, NULL);
-    else if (n == 10)
-        pal_tet10_shape(local, weight, NULL);
-    else
-        memcpy(weight, local, sizeof local);
+    pal_element_shape(n, local, weight);
     const int32_t *node = n == 4 ? (body->interpolation ? in->tets.tet : body->tets->tet) : body->element;
     for (int c = 0; c < n; c++)
         if (fabs(weight[c]) > 1e-12)

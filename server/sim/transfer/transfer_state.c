@@ -3,7 +3,7 @@
 
 #include "server/base/vec3.h"
 #include "server/num/conjugate_gradient.h"
-#include "server/num/polar.h"
+#include "server/sim/core/best_rotation.h"
 #include "server/sim/core/rigid_motion.h"
 #include "server/sim/implicit/system.h"
 #include "server/sim/implicit/tuning.h"
@@ -237,19 +237,17 @@ static int smooth(pal_transfer *t, pal_world *next, double want_J)
 /* reference of the displacement: rest, or for a body without supports its best rigid placement */
 static void find_reference(const pal_body *to, double *out)
 {
-    double c[3], c_rest[3], f[9] = {0}, q[4] = {1, 0, 0, 0}, r[9];
+    double c[3], c_rest[3], pairs[9] = {0}, r[9], arm[3];
     memcpy(out, to->x_rest, 3 * sizeof *out * (size_t)to->n_dof);
     if (!is_free(to)) return;
     pal_rigid_centre(to->n_dof, to->mass_kg, to->x, c);
     pal_rigid_centre(to->n_dof, to->mass_kg, to->x_rest, c_rest);
-    for (int i = 0; i < to->n_dof; i++)
-        for (int a = 0; a < 3; a++)
-            for (int b = 0; b < 3; b++)
-                f[3 * a + b] += to->mass_kg[i] * (to->x[3 * i + a] - c[a]) * (to->x_rest[3 * i + b] - c_rest[b]);
-    pal_polar_rotation(f, q, 100);
-    pal_quat_matrix(q, r);
     for (int i = 0; i < to->n_dof; i++) {
-        double arm[3];
+        pal_sub3(arm, to->x + 3 * i, c);
+        pal_add_outer(pairs, to->mass_kg[i], arm, to->x_rest + 3 * i);
+    }
+    pal_best_rotation(pairs, r);
+    for (int i = 0; i < to->n_dof; i++) {
         pal_sub3(arm, to->x_rest + 3 * i, c_rest);
         pal_mul33(arm, r, arm);
         pal_add3(out + 3 * i, c, arm);
@@ -290,15 +288,13 @@ static double scale_displacement(pal_transfer *t, pal_world *next, double want_J
 /* the velocity beside that of the whole faster or slower, for the kinetic energy of before */
 static void scale_velocity(pal_transfer *t, pal_body *to, double want_J)
 {
-    double c[3], p[3], l[3], all_J = pal_body_kinetic_J(to), rigid_J = 0, *v = t->work[0];
+    double p[3], l[3], all_J = pal_body_kinetic_J(to), rigid_J = 0, *v = t->work[0];
     size_t n_byte = 3 * sizeof *v * (size_t)to->n_dof;
     memset(v, 0, n_byte);
     if (!(all_J > 0)) return;
     if (is_free(to)) {
         pal_rigid_motion r;
-        pal_rigid_centre(to->n_dof, to->mass_kg, to->x, c);
-        pal_rigid_momenta(to->n_dof, to->mass_kg, to->x, to->v, c, p, l);
-        pal_rigid_motion_find(to->n_dof, to->mass_kg, to->x, p, l, &r);
+        pal_rigid_motion_of(to->n_dof, to->mass_kg, to->x, to->v, p, l, &r);
         for (int k = 0; k < to->n_active; k++) {
             int i = pal_body_point(to, k);
             pal_rigid_motion_at(&r, to->x + 3 * i, v + 3 * i);
@@ -319,17 +315,13 @@ static void scale_velocity(pal_transfer *t, pal_body *to, double want_J)
 /* momentum and spin of before */
 static void keep_momentum(const pal_body *from, pal_body *to)
 {
-    double c[3], p[3], l[3], q[3], m[3], next[3];
+    double c[3], p[3], l[3], q[3], m[3];
     pal_rigid_motion r;
-    pal_rigid_centre(from->n_dof, from->mass_kg, from->x, c);
-    pal_rigid_centre(to->n_dof, to->mass_kg, to->x, next);
+    pal_rigid_centre(to->n_dof, to->mass_kg, to->x, c);
     pal_rigid_momenta(from->n_dof, from->mass_kg, from->x, from->v, c, p, l);
     pal_rigid_momenta(to->n_dof, to->mass_kg, to->x, to->v, c, q, m);
     pal_sub3(p, p, q);
     pal_sub3(l, l, m);
-    pal_sub3(next, next, c);
-    pal_cross3(m, next, p);
-    pal_sub3(l, l, m); /* about the new centre */
     pal_rigid_motion_find(to->n_dof, to->mass_kg, to->x, p, l, &r);
     for (int k = 0; k < to->n_active; k++) {
         int i = pal_body_point(to, k);

@@ -1,7 +1,7 @@
 /* Modified butterfly stencils: weights, hand values, polynomials on regular grids, boundaries, smoothness. */
 #include "server/mesh/geometry/butterfly.h"
 #include "server/mesh/geometry/levels.h"
-#include "server/mesh/geometry/stomach.h"
+#include "server/mesh/geometry/procedural.h"
 #include "tests/check.h"
 #include "tests/fixtures/random.h"
 #include "tests/fixtures/shapes.h"

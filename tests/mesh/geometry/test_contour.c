@@ -2,9 +2,8 @@
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/contour.h"
 #include "server/mesh/geometry/decimate.h"
-#include "server/mesh/geometry/organ.h"
+#include "server/mesh/geometry/procedural.h"
 #include "server/mesh/geometry/smooth.h"
-#include "server/mesh/geometry/stomach.h"
 #include "tests/check.h"
 #include "tests/fixtures/random.h"
 

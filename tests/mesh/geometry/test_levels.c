@@ -1,7 +1,7 @@
 /* Detail levels: counts, family tree, winged edges, memory, refusals. */
 #include "server/mesh/files/mesh_file.h"
 #include "server/mesh/geometry/levels.h"
-#include "server/mesh/geometry/stomach.h"
+#include "server/mesh/geometry/procedural.h"
 #include "tests/check.h"
 #include "tests/fixtures/random.h"
 #include "tests/fixtures/shapes.h"

@@ -1,6 +1,6 @@
 /* Procedural hollow bodies: counts, shape, quality, rings, refusals. */
 #include "server/mesh/geometry/levels.h"
-#include "server/mesh/geometry/stomach.h"
+#include "server/mesh/geometry/procedural.h"
 #include "tests/check.h"
 #include "tests/fixtures/shapes.h"
 

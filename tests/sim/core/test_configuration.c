@@ -1,7 +1,7 @@
 /* Configurations: that of a scene, put into it again, into other models and sizes, and what is refused. */
 #include "server/sim/core/configuration.h"
 
-#include "server/mesh/geometry/stomach.h"
+#include "server/mesh/geometry/procedural.h"
 #include "server/sim/world/world.h"
 #include "tests/fixtures/subdivision_scene.h"
 

@@ -1,4 +1,4 @@
-#include "server/bench/bench_report.h"
+#include "server/cli/table.h"
 
 #include "server/cli/report.h"
 
@@ -7,9 +7,9 @@
 #include <stdio.h>
 #include <string.h>
 
-void bench_note(bench_report *r, const char *format, ...)
+void pal_table_note(pal_table *r, const char *format, ...)
 {
-    if (r->json) return;
+    if (r->silent) return;
     va_list args;
     va_start(args, format);
     vprintf(format, args);
@@ -17,7 +17,7 @@ void bench_note(bench_report *r, const char *format, ...)
     printf("\n");
 }
 
-void bench_list(bench_report *r, const char *key)
+void pal_table_list(pal_table *r, const char *key)
 {
     r->has_head = false;
     r->list = key ? cJSON_AddArrayToObject(r->root, key) : NULL;
@@ -29,7 +29,7 @@ static void add_cell(char line[1024], int width, const char *text)
     snprintf(line + used, 1024 - used, "%s%*s", used ? " " : "", width, text);
 }
 
-void bench_row(bench_report *r, const bench_cell *cell)
+void pal_table_row(pal_table *r, const pal_table_cell *cell)
 {
     char head[1024] = "", line[1024] = "";
     cJSON *object = r->list ? cJSON_CreateObject() : r->root;
@@ -39,12 +39,14 @@ void bench_row(bench_report *r, const bench_cell *cell)
         if (isfinite(cell->number)) snprintf(number, sizeof number, "%.*f", cell->digits, cell->number);
         if (cell->key)
             cJSON_AddItemToObject(object, cell->key,
-                                  cell->text ? JSON_TEXT(cell->text) : pal_json_or_null(cell->number));
+                                  cell->tree   ? cell->tree
+                                  : cell->text ? JSON_TEXT(cell->text)
+                                               : pal_json_or_null(cell->number));
         if (!cell->head) continue;
         add_cell(head, cell->width, cell->head);
         add_cell(line, cell->width, cell->text ? cell->text : number);
     }
-    if (r->json || !line[0]) return;
+    if (r->silent || !line[0]) return;
     if (!r->has_head) printf("%s\n", head);
     printf("%s\n", line);
     r->has_head = true;

@@ -1,8 +1,13 @@
-/* Procedural hollow bodies for the adaptive surface springs (paper C, Table I): a sphere of 114 vertices, a stomach of
- * 188, a sheet of fabric. The surfaces are deterministic; each owns heap memory (pal_surface_free). Thread: [load]. */
-#ifndef PAL_MESH_GEOMETRY_STOMACH_H
-#define PAL_MESH_GEOMETRY_STOMACH_H
+/* Procedural surfaces: an organ, shown when no scan is available, and hollow bodies for the adaptive surface springs
+ * (paper C, Table I): a sphere of 114 vertices, a stomach of 188, a sheet of fabric. They are the same every time; each
+ * owns heap memory (pal_surface_free). Thread: [load]. */
+#ifndef PAL_MESH_GEOMETRY_PROCEDURAL_H
+#define PAL_MESH_GEOMETRY_PROCEDURAL_H
 #include "server/mesh/geometry/surface.h"
+
+/* liver-like, closed, smooth, about 0.2 m across; about n_tri_about triangles (500 to 500000; others are clamped);
+ * MEMORY */
+pal_err pal_organ_make(int n_tri_about, pal_surface *out);
 
 enum { PAL_SPHERE_VERTEX = 114, PAL_STOMACH_VERTEX = 188, PAL_STOMACH_RING = 6 };
 
