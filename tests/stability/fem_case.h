@@ -1,4 +1,4 @@
-/* What the hard cases (catalogue.txt) for model fem share: the elements and laws they run with, insults to a
+/* What the hard cases (catalogue.txt) for model fem share: the elements and laws they run with, cases to a
  * body's shape, and runs that watch energy and finiteness after every step. */
 #ifndef TESTS_STABILITY_FEM_HARD_H
 #define TESTS_STABILITY_FEM_HARD_H

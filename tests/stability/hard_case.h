@@ -21,7 +21,7 @@
         if (!(hard_v <= hard_b))                                                                                       \
             CHECK_FAIL("%s (%s), %s: %.9g, wanted <= %.9g %s", id, models, what, hard_v, hard_b, unit);                \
     } while (0)
-/* asserts good == n: n times the insult, good times what should be was */
+/* asserts good == n: n times the case, good times what should be was */
 #define HARD_CASE_ALL(id, models, what, good, n)                                                                       \
     do {                                                                                                               \
         double hard_v = (good), hard_b = (n);                                                                          \

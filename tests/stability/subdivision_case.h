@@ -1,5 +1,5 @@
 /* What the hard cases (catalogue.txt) for model subdivision_fem share: the solvers and operators they run with,
- * insults to the control points, and runs that watch energy and finiteness after every step. */
+ * cases to the control points, and runs that watch energy and finiteness after every step. */
 #ifndef TESTS_STABILITY_SOLID_HARD_H
 #define TESTS_STABILITY_SOLID_HARD_H
 #include "server/sim/subdivision/subdivision_mass.h"

@@ -92,7 +92,7 @@ static void case_node(const double *rest, trial_case kind, double *x)
     }
 }
 
-static void insulted(trial_case kind, double seconds, double back)
+static void disturbed(trial_case kind, double seconds, double back)
 {
     for (int run = 0; run < KINDS; run++) {
         shell_scene s;
@@ -114,31 +114,31 @@ static void insulted(trial_case kind, double seconds, double back)
 
 static void a_flattened_shell_opens_again(void)
 {
-    insulted(FLAT, recover_s, 1e-3);
+    disturbed(FLAT, recover_s, 1e-3);
 }
 static void a_shell_on_a_point_opens_again(void)
 {
-    insulted(POINT, recover_s, 1e-3);
+    disturbed(POINT, recover_s, 1e-3);
 }
 static void a_mirrored_shell_comes_back(void)
 {
-    insulted(MIRRORED, recover_s, 1e-3);
+    disturbed(MIRRORED, recover_s, 1e-3);
 }
 static void a_shuffled_shell_comes_back(void)
 {
-    insulted(SHUFFLED, recover_s, 1e-3);
+    disturbed(SHUFFLED, recover_s, 1e-3);
 }
 static void a_shell_blown_up_a_hundredfold_comes_back(void)
 {
-    insulted(BLOWN_UP, recover_s, 1e-3);
+    disturbed(BLOWN_UP, recover_s, 1e-3);
 }
 static void a_shell_turned_inside_out_comes_back(void)
 {
-    insulted(INVERTED, recover_s, 1e-3);
+    disturbed(INVERTED, recover_s, 1e-3);
 }
 static void a_shell_whose_walls_touch_comes_back(void)
 {
-    insulted(TOUCHING, recover_s, 1e-3);
+    disturbed(TOUCHING, recover_s, 1e-3);
 }
 
 /* every second edge of level 0 without length: both its ends on one place */

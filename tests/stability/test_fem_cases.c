@@ -1,4 +1,4 @@
-/* Hard cases (catalogue.txt) for model fem: insults from outside. Long steps, a meganewton, resting for long,
+/* Hard cases (catalogue.txt) for model fem: cases from outside. Long steps, a meganewton, resting for long,
  * turns of body and support, numbers that are none, tools that jump, appear inside or press against one another. */
 #include "server/num/polar.h"
 #include "tests/fixtures/random.h"

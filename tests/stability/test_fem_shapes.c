@@ -1,6 +1,6 @@
 /* Hard cases (catalogue.txt) for model fem: shapes. Whatever a body's nodes are put to (one element turned over,
  * all in a plane, on a point, mirrored, shuffled, blown up), it comes back to rest with no element turned over, its
- * state stays finite and its energy does not rise above what the insult put in. */
+ * state stays finite and its energy does not rise above what the case put in. */
 #include "tests/fixtures/random.h"
 #include "tests/stability/fem_case.h"
 #include "tests/stability/hard_case.h"
@@ -33,13 +33,13 @@ static void an_element_that_is_turned_over_turns_back(void)
         CHECK(run.finite);
         CHECK_LE(run.max, 1.01);
         HARD_CASE("inverted", "fem", "within 0.1 % S of rest after", run.return_s, 2, "s");
-        HARD_CASE("inverted", "fem", "energy over the insult's", run.max, 1.01, "");
+        HARD_CASE("inverted", "fem", "energy over that put in", run.max, 1.01, "");
         CHECK_INT(hard_inverted(&b), 0);
         beam_free(&b);
     }
 }
 
-/* within 10 s; a single seed of the insults that have none */
+/* within 10 s; a single seed of the cases that have none */
 static void flat_collapsed_mirrored_and_blown_up_bodies_come_back(void)
 {
     static const double poisson[] = {0.3, 0.45, 0.499};
@@ -58,7 +58,7 @@ static void flat_collapsed_mirrored_and_blown_up_bodies_come_back(void)
                 hard_steps(&b, max_simulated_s, 1.0 / 60, &run);
                 printf(" %s %.2f s (energy %.2f)", case_names[trial_case], run.return_s, run.max);
                 CHECK(run.finite);
-                HARD_CASE(case_cases[trial_case], "fem", "energy over the insult's", run.max, 1.01, "");
+                HARD_CASE(case_cases[trial_case], "fem", "energy over that put in", run.max, 1.01, "");
                 HARD_CASE(case_cases[trial_case], "fem", "within 0.1 % S of rest after", run.return_s, max_simulated_s,
                           "s");
             }
@@ -89,7 +89,7 @@ static void shuffled_bodies_come_back_for_every_seed(void)
             printf("  %-11s nu %.3f: %d of %d back, the last after %.2f s; energy up to %.3f, largest rise %.2g\n",
                    hard_kinds[k].shown, poisson[q], back, n, last, max, rise);
             HARD_CASE_ALL("shuffle", "fem", "shuffled or exchanged: back within 10 s", back, n);
-            HARD_CASE("shuffle", "fem", "energy over the insult's", max, 1.01, "");
+            HARD_CASE("shuffle", "fem", "energy over that put in", max, 1.01, "");
             beam_free(&b);
         }
 }

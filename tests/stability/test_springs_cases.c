@@ -153,7 +153,7 @@ static void flattened_collapsed_mirrored_shuffled_and_blown_up_bodies_come_back(
                    rms_from_rest(b.body) / b.body->length_scale_m, pal_world_substeps(b.world),
                    (unsigned long long)b.body->safeguards.n_mass_scaled,
                    (unsigned long long)b.body->safeguards.n_clamped);
-            HARD_CASE(names[kind], "tet_springs", "extent over that of the insult",
+            HARD_CASE(names[kind], "tet_springs", "extent over that at the start",
                       extent(b.body) / fmax(before, b.body->length_scale_m), 1.5, "");
             CHECK(b.body->safeguards.n_inversion > 0 || kind == 0);
             if (goes_back) CHECK_INT(count_inverted(b.body), 0);

@@ -1,4 +1,4 @@
-/* Hard cases (catalogue.txt) for model subdivision_fem: insults from outside. A meganewton, resting for long,
+/* Hard cases (catalogue.txt) for model subdivision_fem: cases from outside. A meganewton, resting for long,
  * tools that jump and appear inside, numbers that are none, elements deleted; and Fig. 10 of paper A, where the same
  * force moves what is painted heavy otherwise. */
 #include "server/mesh/cells/cell_edits.h"

@@ -67,7 +67,7 @@ static void a_chair_comes_back_from_any_shape(void)
                        (int)s.body->safeguards.n_inversion);
                 CHECK(run.finite && s.body->safeguards.n_inversion > 0 && s.body->safeguards.n_split >= 2);
                 HARD_CASE(chair_cases[how], "subdivision_fem", chair_words[how], run.return_s, 10, "s");
-                HARD_CASE(chair_cases[how], "subdivision_fem", "chair: energy over the insult's", run.max, 1.01, "");
+                HARD_CASE(chair_cases[how], "subdivision_fem", "chair: energy over that put in", run.max, 1.01, "");
             }
         solid_scene_close(&s);
     }

@@ -1,6 +1,6 @@
 /* Hard cases (catalogue.txt) for model subdivision_fem: shapes. Whatever the control points are put to (a corner
  * through its cell, all in a plane, on a point, mirrored, blown up, shuffled, swapped), the solid comes back to rest
- * with no element turned over, and its energy does not rise above what the insult put in. No point moves more than 0.2
+ * with no element turned over, and its energy does not rise above what the case put in. No point moves more than 0.2
  * S in a step of the implicit solver, so that the way back from x 100 alone takes 8 s. Operator edges is no gradient of
  * an energy: it comes back up to nu 0.45, with the implicit solver from any shape, with the explicit one from a corner
  * turned over. */
@@ -43,7 +43,7 @@ static void a_corner_that_is_turned_over_turns_back(void)
         printf("  %s, nu %.3f: back after %.2f s, energy up to %.3f\n", solid_kinds[k].shown, poisson[q], run.return_s,
                run.max);
         CHECK(run.finite);
-        HARD_CASE("inverted", "subdivision_fem", "energy over the insult's", run.max, 1.01, "");
+        HARD_CASE("inverted", "subdivision_fem", "energy over that put in", run.max, 1.01, "");
         HARD_CASE("inverted", "subdivision_fem", "within 0.1 % S of rest after", run.return_s, 2, "s");
         CHECK(s.body->safeguards.n_inversion > 0);
         solid_scene_close(&s);
@@ -73,7 +73,7 @@ static double case_all(int kind, double poisson, int n_seed, double *max)
         }
         const char *id = solid_cases[trial_case];
         if (n > 1) HARD_CASE_ALL(id, "subdivision_fem", "shuffled or exchanged: back within 10 s", back, n);
-        HARD_CASE(id, "subdivision_fem", "energy over the insult's", *max, 1.01, "");
+        HARD_CASE(id, "subdivision_fem", "energy over that put in", *max, 1.01, "");
         HARD_CASE(id, "subdivision_fem", "within 0.1 % S of rest after", late, 10, "s");
         printf(" %s %d of %d (%.2f s)", subdivision_case_names[trial_case], back, n, late);
         last = fmax(last, late);

@@ -111,7 +111,7 @@ static bool tap_rows(pal_world *world)
     return tap.contact && tap.solver;
 }
 
-/* ---- insults ---- */
+/* ---- cases ---- */
 
 static bool open_case(model_scene *m, const body_case *c, double max_N, double friction, bool fixed)
 {
