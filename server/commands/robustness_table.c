@@ -1,5 +1,7 @@
 #include "server/commands/robustness_table.h"
 
+#include "server/robustness/tuning.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -38,7 +40,7 @@ static void print_row(FILE *to, const pal_robustness_job *first, int n, double *
             n_bad += r->safe == PAL_NO || r->recovered == PAL_NO;
             if (r->peak_contact_N > 0) peak = fmax(peak, r->peak_contact_N / r->contact_cap_N);
             if (!isfinite(r->return_s) || r->recovered != PAL_YES) continue;
-            time_s[n_time++] = r->return_s, n_soon += r->return_s <= 10;
+            time_s[n_time++] = r->return_s, n_soon += r->return_s <= PAL_RETURN_TIME_S;
         }
     }
     qsort(time_s, (size_t)n_time, sizeof *time_s, by_value);

@@ -25,14 +25,17 @@ static pal_err find_items(int n, const pal_cliques *list, int n_list, incidence 
     }
     for (int i = 0; i < n; i++) start[i + 2] += start[i + 1];
     PAL_ARRAY(&err, item, start[n + 1]);
-    if (err) free(start);
-    for (int l = 0; l < n_list && !err; l++) {
+    if (err) {
+        free(start);
+        return err;
+    }
+    for (int l = 0; l < n_list; l++) {
         const int32_t *node = list[l].node;
         for (int64_t e = 0; e < list[l].n_item; e++)
             for (int c = 0; c < list[l].n_corner; c++) item[start[*node++ + 1]++] = (int64_t)l << 40 | e;
     }
     *out = (incidence){start, item};
-    return err;
+    return PAL_ERR_OK;
 }
 
 /* column[j] += 1 for every pair (i, j <= i); with row: row[column[j]++] = i as well */

@@ -7,7 +7,7 @@
 #ifndef PAL_NUM_SPLINE_H
 #define PAL_NUM_SPLINE_H
 
-enum { PAL_GAUSS4 = 4, PAL_CELL_GAUSS_POINTS = 64, PAL_CELL_MAX_NODES = 64 };
+enum { PAL_CELL_GAUSS_POINTS = 64, PAL_CELL_MAX_NODES = 64 };
 extern const double pal_gauss4_at[4], pal_gauss4_weight[4]; /* on [0, 1], weights sum to 1 */
 
 /* the four cubic B-splines of a span and their derivatives (either may be NULL) */

@@ -8,14 +8,13 @@
  * safe       Every number is finite, no body is stopped unless the case allows it, nothing grows without bound, bad
  *            input is refused, and in every step
  *            - the energy is at most that after the disturbance plus 1 %. Solver verlet 5 %, central_cg 30 %: their
- *              velocities lag their positions by half a sub-step, which appears as a ripple. A step in which
- *              hexahedra change to or from their split is not judged, because the two store different energies at
- *              the same shape;
+ *              velocities lag their positions by half a sub-step, which appears as a ripple. A step in which tools
+ *              release is not judged;
  *            - the contact force that was solved for is at most the force cap of the tool.
  * recovered  After release the scene is within 0.1 % S of rest in RMS, S being the box diagonal, or its error falls as
  *            an exponential towards that (return_watch.h); no element is inverted. A body without supports is
  *            compared after the best rigid motion. A body asleep off rest has not recovered.
- * returns    In so many simulated seconds, measured or extrapolated.
+ * returns    The simulated seconds until it is back, measured or extrapolated.
  *
  * The verdict is `failed` for a case that is not safe or not recovered, `slow` where the return is extrapolated to
  * more than 10 s, else `passed`. Springs whose model key recover is false may stay inverted or be stopped, because a
@@ -90,8 +89,7 @@ typedef struct pal_robustness_result {
     /* largest excess energy over the initial energy plus the work input, as a share of that; its limit. NaN: not
      * judged */
     double energy, limit;
-    /* sum of the energy rises that were not judged (hexahedra that change to their split, steps in which tools
-     * release), as the same share; NaN: as energy */
+    /* sum of the energy rises that were not judged (steps in which tools release), as the same share; NaN: as energy */
     double excluded_rise;
     double peak_contact_N, contact_cap_N; /* largest solved contact force of a tool, and that tool's cap */
     /* final RMS distance from rest over S; simulated time from release until within 0.1 % to the end, measured or

@@ -41,7 +41,7 @@ static inline pal_elastic_hexes *hard_hex_row(const fem_beam *b)
     return NULL;
 }
 
-/* tetrahedra of the split or of the body that are turned over or flat; hexahedra: corners too */
+/* tetrahedra of the body's mesh that are inverted or flat; hexahedra: corners too */
 static inline int hard_inverted(const fem_beam *b)
 {
     const pal_body *body = b->body;
@@ -130,7 +130,8 @@ static inline void hard_case(fem_beam *b, int trial_case, uint64_t seed)
 typedef struct hard_run {
     bool finite;
     double max;  /* energy less the work of lasting loads, over that at the begin */
-    double rise; /* largest rise of it in one step in which cubes and split did not change, over that at the begin */
+    double rise; /* largest rise of it in one step in which no region began or ended, over that at the begin: those the
+                    tank pays */
     double return_s; /* when it was within 0.1 % S of rest for good with no element inverted; INFINITY: was not */
 } hard_run;
 
@@ -142,13 +143,13 @@ static inline void hard_steps(fem_beam *b, double seconds, double dt_s, hard_run
     const double size = fabs(first) > 0 ? fabs(first) : 1;
     *out = (hard_run){.finite = true, .max = 0, .return_s = INFINITY};
     for (int i = 0; i < n; i++) {
-        uint64_t split = b->body->safeguards.n_split;
+        uint64_t n_change = b->body->safeguards.n_split;
         pal_err err = pal_world_step(b->world, dt_s);
         out->finite = out->finite && !err && pal_body_finite(b->body) && !b->body->frozen;
         if (!out->finite) return;
         double now = pal_world_energy_J(b->world) - hard_work_J(b->body);
         out->max = fmax(out->max, now / size);
-        if (b->body->safeguards.n_split == split) out->rise = fmax(out->rise, (now - before) / size);
+        if (b->body->safeguards.n_split == n_change) out->rise = fmax(out->rise, (now - before) / size);
         before = now;
         if (hard_rms(b->body) > 1e-3 * b->body->length_scale_m || hard_inverted(b) > 0)
             out->return_s = INFINITY;

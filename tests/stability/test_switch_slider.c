@@ -296,8 +296,7 @@ static void a_beam_under_a_pull_does_not_tear(void)
     pal_cells_free(&cells);
 }
 
-/* cubes that a pull turns over do not take turns with their split for ever, some millimetres apart: they are tried
- * again only where they are less crushed */
+/* cubes that a pull crushes do not enter and leave regions for ever */
 static void crushed_cubes_come_to_rest(void)
 {
     enum { COARSE = 1 };
@@ -313,7 +312,7 @@ static void crushed_cubes_come_to_rest(void)
     CHECK(r->n_inversion > 0);
     step(w, 1.0 / 60, 120);
     if (table) printf("  %d changes in a second, %d in the next two\n", (int)before, (int)(r->n_split - before));
-    CHECK_LE((double)(r->n_split - before), 2); /* some 200 when cubes were tried whenever they were whole */
+    CHECK_LE((double)(r->n_split - before), 2);
     pal_world_destroy(w);
     free_pulled(&p, &mesh);
     pal_surface_free(&organ);

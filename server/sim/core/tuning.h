@@ -53,9 +53,8 @@ enum { PAL_SPRING_GRID_NODES_MAX = 1 << 20 };
 
 /* ---- elements ---- */
 
-/* elements with larger Poisson ratios lock in volume: those of subdivision solids share their changes of volume, a
- * split of inverted elements takes this ratio at most (of 720 shuffled bodies all recover with it, one in a hundred
- * does not with 0.45; tests/sim/elements/test_hex_recovery.c, tests/sim/subdivision/test_cell_volume.c) */
+/* elements of subdivision solids with larger Poisson ratios lock in volume: they share their changes of volume
+ * (tests/sim/subdivision/test_cell_volume.c) */
 #define PAL_LOCK_FREE_POISSON 0.3
 /* least part of the material of a border voxel, and of the moduli of a region of inverted elements, so that no node is
  * left nearly without stiffness and mass (tests/sim/solvers/test_fem_dynamic.c,

@@ -92,10 +92,9 @@ static int edges(const void *self, int e, int32_t out[][2])
 }
 
 /* mu here is that of the material times share and h / 16, and mu V = 16 h^2 of it; so is lambda */
-static double stiffness(const void *self, int e, int a, int b)
+static double stiffness(const void *self, int e)
 {
     const pal_elastic_hexes *cubes = self;
-    (void)a, (void)b;
     const int lane = cubes->simd_blocks.place[e];
     return pal_recovery_stiffness_N_m(16 * cubes->whole[0][lane], 16 * cubes->whole[1][lane], 12, 1);
 }

@@ -84,13 +84,12 @@ static int edges(const void *self, int e, int32_t out[][2])
     return n;
 }
 
-static double stiffness(const void *self, int e, int a, int b)
+static double stiffness(const void *self, int e)
 {
     const pal_elastic_tets *t = self;
     int32_t pair[PAL_RECOVERY_EDGES_MAX][2];
     const int n = edges(t, e, pair);
     double mu, lambda, square = 0;
-    (void)a, (void)b;
     pal_tet_whole_stiffness(t, e, &mu, &lambda);
     for (int i = 0; i < n; i++)
         square += pow(pal_dist3(t->x_rest + 3 * (size_t)pair[i][0], t->x_rest + 3 * (size_t)pair[i][1]), 2) / n;

@@ -426,7 +426,7 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
         }
         to->residual = core->reference > 0 ? core->cg.residual / core->reference : 0;
         to->converged = core->cg.residual <= best;
-        /* from here on all is a rescue: the search, and the iterations that follow it */
+        /* from here on all is a safeguard: the search, and the iterations that follow it */
         if (max > core->options.newton) body->safeguards.ns += pal_clock_ns() - again_ns;
         if (!rises(core, 0)) return PAL_ERR_OK;
         core->energy_rose = max == PAL_SAFEGUARD_NEWTON;

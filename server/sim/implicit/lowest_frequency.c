@@ -67,7 +67,7 @@ static bool find_elements(const pal_body *body, pal_cliques *out)
     return body->active || body->element || body->tets;
 }
 
-/* g at rest + part * unit of the group's points along the axis */
+/* body->g with the group's points moved by move_m along the axis from rest */
 static void find_forces(const search *s, const int32_t *point, int n, int axis, double move_m)
 {
     pal_body *body = s->body;

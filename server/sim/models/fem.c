@@ -5,10 +5,11 @@
  * scaled by its filled share, at least PAL_FILL_MIN).
  *
  * Components: hex_elastic or tet_elastic with the same keys, viscous where the material has damping, solver
- * implicit_euler. Under static_newton a neo_hookean body never recovers on its split, which is another material: a
- * corner inverted at a clamped edge is part of the discrete rest state. Masses are lumped: equal shares to the corners;
- * tet10 by Hinton, Rock and Zienkiewicz (1976), 1/36 of an element to a corner and 4/27 to a middle node, which are all
- * positive. tet10 has its middle nodes behind the mesh's own, whose numbers (skin, supports) stay true. */
+ * implicit_euler. Under static_newton a neo_hookean body has no recovery, because the edges of a region are another
+ * material: a corner inverted at a clamped edge is part of the discrete rest state. Masses are lumped: equal shares to
+ * the corners; tet10 by Hinton, Rock and Zienkiewicz (1976), 1/36 of an element to a corner and 4/27 to a middle node,
+ * which are all positive. tet10 has its middle nodes behind the mesh's own, whose numbers (skin, supports) stay true.
+ */
 #include "server/base/vec3.h"
 #include "server/num/shape_functions.h"
 #include "server/sim/core/effect_list.h"

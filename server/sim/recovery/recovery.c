@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NOT = -1, NEW = -2 };
+enum { NONE = -1, NEW_REGION = -2 };
 
 /* ---- load ---- */
 
@@ -29,19 +29,19 @@ static pal_err find_edges(pal_recovery *r, pal_arena *arena)
         free(head), free(next), free(far);
         return PAL_ERR_MEMORY;
     }
-    for (int i = 0; i < r->n_node; i++) head[i] = NOT;
+    for (int i = 0; i < r->n_node; i++) head[i] = NONE;
     r->n_edge = 0;
     for (int e = 0; e < m->n_element; e++)
         for (int k = m->edges(m->self, e, pair) - 1; k >= 0; k--) {
             const int32_t a = pair[k][0] < pair[k][1] ? pair[k][0] : pair[k][1], b = pair[k][0] + pair[k][1] - a;
             int32_t at = head[a];
-            while (at != NOT && far[at] != b) at = next[at];
-            if (at == NOT) at = r->n_edge++, far[at] = b, next[at] = head[a], head[a] = at;
+            while (at != NONE && far[at] != b) at = next[at];
+            if (at == NONE) at = r->n_edge++, far[at] = b, next[at] = head[a], head[a] = at;
             r->edge_of[r->first[e] + k] = at;
         }
     r->end = PAL_NEW(arena, int32_t, 2 * (size_t)r->n_edge);
     for (int i = 0; i < r->n_node && r->end; i++)
-        for (int32_t at = head[i]; at != NOT; at = next[at]) r->end[2 * at] = i, r->end[2 * at + 1] = far[at];
+        for (int32_t at = head[i]; at != NONE; at = next[at]) r->end[2 * at] = i, r->end[2 * at + 1] = far[at];
     free(head), free(next), free(far);
     return r->end ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
@@ -69,7 +69,7 @@ pal_err pal_recovery_make(const pal_recovery_model *model, int n_node, const dou
     if (!r->k_N_m || !r->active || !r->edge_region || !r->region || !r->on || !r->low || !r->high || !r->middle ||
         !r->root)
         return PAL_ERR_MEMORY;
-    for (size_t e = 0; e < n; e++) r->region[e] = NOT, r->on[e] = 1;
+    for (size_t e = 0; e < n; e++) r->region[e] = NONE, r->on[e] = 1;
     *out = r;
     return PAL_ERR_OK;
 }
@@ -80,15 +80,16 @@ static const int32_t *ends(const pal_recovery *r, int edge)
 }
 
 /* the regions are known: which elements act, and the constants of the edges of the others */
-static void show(pal_recovery *r)
+static void apply_regions(pal_recovery *r)
 {
     const pal_recovery_model *m = &r->model;
     memset(r->k_N_m, 0, sizeof *r->k_N_m * (size_t)r->n_edge);
     for (int e = 0; e < m->n_element; e++) {
         r->on[e] = r->region[e] < 0;
+        const double k_N_m = r->on[e] ? 0 : m->stiffness_N_m(m->self, e);
         for (int s = r->first[e]; s < r->first[e + 1] && !r->on[e]; s++) {
             const int i = r->edge_of[s];
-            r->k_N_m[i] += m->stiffness_N_m(m->self, e, ends(r, i)[0], ends(r, i)[1]);
+            r->k_N_m[i] += k_N_m;
             r->edge_region[i] = r->region[e];
         }
     }
@@ -102,16 +103,16 @@ static void show(pal_recovery *r)
 void pal_recovery_reset(pal_recovery *r)
 {
     const bool any = r->n_region > 0;
-    for (int e = 0; e < r->model.n_element && any; e++) r->region[e] = NOT;
+    for (int e = 0; e < r->model.n_element && any; e++) r->region[e] = NONE;
     r->n_region = 0;
     r->was_bad = false;
     r->bad_s = r->tank_J = r->debt_J = 0;
-    if (any) show(r);
+    if (any) apply_regions(r);
 }
 
 void pal_recovery_refresh(pal_recovery *r)
 {
-    if (r->n_region > 0) show(r);
+    if (r->n_region > 0) apply_regions(r);
 }
 
 void pal_recovery_transfer(pal_recovery *r, const pal_recovery *from)
@@ -124,7 +125,7 @@ void pal_recovery_transfer(pal_recovery *r, const pal_recovery *from)
     r->debt_J = from->debt_J, r->booked_J = from->booked_J, r->seen_s = from->seen_s, r->touched = true;
     memcpy(r->d_m, from->d_m, 3 * sizeof *r->d_m * (size_t)r->n_node);
     memcpy(r->load_N, from->load_N, 3 * sizeof *r->load_N * (size_t)r->n_node);
-    if (any) show(r);
+    if (any) apply_regions(r);
 }
 
 /* ---- the energy of regions ---- */
@@ -286,7 +287,7 @@ static void join(pal_recovery *r, bool all)
 {
     pal_union_find_init(r->root, r->n_node);
     for (int e = 0; e < r->model.n_element; e++)
-        for (int s = r->first[e]; s < r->first[e + 1] && (all || r->region[e] != NOT); s++)
+        for (int s = r->first[e]; s < r->first[e + 1] && (all || r->region[e] != NONE); s++)
             pal_union_find_join(r->root, ends(r, r->edge_of[s])[0], ends(r, r->edge_of[s])[1]);
 }
 
@@ -318,9 +319,9 @@ static bool grow(pal_recovery *r, const bool *grows)
             }
     for (int e = 0; e < r->model.n_element; e++) {
         bool beside = false;
-        for (int s = r->first[e]; s < r->first[e + 1] && r->region[e] == NOT && !beside; s++)
+        for (int s = r->first[e]; s < r->first[e + 1] && r->region[e] == NONE && !beside; s++)
             for (int b = 0; b < 2; b++) beside |= r->root[follow(r, ends(r, r->edge_of[s])[b])] < 0;
-        if (beside) r->region[e] = NEW;
+        if (beside) r->region[e] = NEW_REGION;
         any |= beside;
     }
     return any;
@@ -339,7 +340,8 @@ static bool enter(pal_recovery *r, bool pressed)
     }
     any = asked && grow(r, grows);
     for (int e = 0; e < r->model.n_element; e++)
-        if (r->region[e] == NOT && (is_crushed(r, e) || (lasts && is_bad(r, e)))) r->region[e] = NEW, any = true;
+        if (r->region[e] == NONE && (is_crushed(r, e) || (lasts && is_bad(r, e))))
+            r->region[e] = NEW_REGION, any = true;
     return any;
 }
 
@@ -354,7 +356,7 @@ static void number(pal_recovery *r)
     r->n_region = 0;
     for (int e = 0; e < r->model.n_element; e++) {
         const int was = r->region[e];
-        if (was == NOT) continue;
+        if (was == NONE) continue;
         /* a root that has a number is -1 - number */
         const int i = node_of(r, e), at = r->root[i] >= 0 ? r->root[i] : i;
         if (r->root[at] >= 0) {
@@ -366,7 +368,7 @@ static void number(pal_recovery *r)
         const int now = r->region[e] = -1 - r->root[at];
         pal_recovery_region *region = &r->of[now];
         region->n++;
-        if (home[now] != was) home[now] = NOT;
+        if (home[now] != was) home[now] = NONE;
         region->grow_s = fmax(region->grow_s, was >= 0 ? old[was].grow_s : 0);
     }
     for (int p = 0; p < r->n_region; p++) {
@@ -414,7 +416,7 @@ static double work_J(pal_recovery *r, const pal_body *body)
     return same && !r->touched ? sum : NAN;
 }
 
-static void remember(pal_recovery *r, const pal_body *body)
+static void save_loads(pal_recovery *r, const pal_body *body)
 {
     const double *lasting = body->external_force;
     r->touched = false;
@@ -432,12 +434,12 @@ static bool is_driven(const pal_body *body)
 }
 
 /* the floor of s has put in what the tank cannot pay */
-static void pay(pal_recovery *r, double cost_J)
+static void withdraw(pal_recovery *r, double cost_J)
 {
     r->tank_J -= cost_J;
     if (r->tank_J < 0) r->debt_J -= r->tank_J, r->tank_J = 0;
 }
-static void receive(pal_recovery *r, double gain_J)
+static void deposit(pal_recovery *r, double gain_J)
 {
     const double repaid = fmin(gain_J, r->debt_J);
     r->debt_J -= repaid;
@@ -446,11 +448,11 @@ static void receive(pal_recovery *r, double gain_J)
 
 /* gain: what has left the body since the last update. Less the work of loads it has dissipated that, which fills the
  * tank. What a change from outside has put in (material, supports) the tank pays, and where it cannot, s is lowered */
-static void settle(pal_recovery *r, const pal_body *body, double gain)
+static void update_tank(pal_recovery *r, const pal_body *body, double gain)
 {
     gain += work_J(r, body);
     if (isnan(gain)) return;
-    if (gain >= 0) receive(r, gain);
+    if (gain >= 0) deposit(r, gain);
     if (gain >= 0 || is_driven(body)) return;
     double left = -gain - r->tank_J, regions = 0;
     r->tank_J = fmax(0, r->tank_J + gain);
@@ -464,17 +466,17 @@ static void settle(pal_recovery *r, const pal_body *body, double gain)
     }
 }
 
-/* s rises to 1 as the tank permits; under a load that would draw soft tissue out by 1 / s it rises in any case */
-static void stiffen(pal_recovery *r, double passed_s, bool pressed)
+/* s rises to 1 as the tank permits */
+static void stiffen(pal_recovery *r, double passed_s)
 {
     for (int p = 0; p < r->n_region; p++) {
         pal_recovery_region *region = &r->of[p];
         if (region->scale >= 1) continue;
         const double phi = region->energy_J / region->scale;
         double by = fmin(1 - region->scale, passed_s / PAL_RECOVERY_STIFFEN_S);
-        if (by * phi > r->tank_J && !pressed) by = r->tank_J / phi;
+        if (by * phi > r->tank_J) by = r->tank_J / phi;
         region->scale += by, region->energy_J += by * phi;
-        pay(r, by * phi);
+        withdraw(r, by * phi);
     }
 }
 
@@ -494,7 +496,7 @@ static bool leave(pal_recovery *r, const pal_body *body, double elements_J)
         const bool settled = isinf(r->tank_J) || region->good_s >= PAL_RECOVERY_WHOLE_S;
         if (rise > r->tank_J || (!settled && stored_J > strain2 / 6 * region->size_J)) continue;
         for (int e = 0; e < r->model.n_element; e++)
-            if (r->region[e] == p) r->region[e] = NOT;
+            if (r->region[e] == p) r->region[e] = NONE;
         elements_J = all_J;
         any = true;
     }
@@ -506,7 +508,7 @@ static bool leave(pal_recovery *r, const pal_body *body, double elements_J)
 static void begin(pal_recovery *r, const pal_body *body, double before_J)
 {
     number(r);
-    show(r);
+    apply_regions(r);
     fix(r, body, true);
     double new_J = 0, left_J = before_J - r->model.energy(r->model.self, body);
     (void)pal_recovery_energy(r, body->d, NULL);
@@ -520,9 +522,9 @@ static void begin(pal_recovery *r, const pal_body *body, double before_J)
         if (!r->of[p].stays) r->of[p].scale = scale, r->of[p].energy_J *= scale;
     const double gain = left_J - scale * new_J;
     if (gain >= 0)
-        receive(r, gain);
+        deposit(r, gain);
     else
-        pay(r, -gain);
+        withdraw(r, -gain);
 }
 
 static double regions_J(const pal_recovery *r)
@@ -547,13 +549,13 @@ static bool update(pal_recovery *r, pal_step *step, double passed_s)
         if (step->finds_balance)
             r->tank_J = INFINITY;
         else
-            settle(r, body, r->booked_J);
-        stiffen(r, step->finds_balance ? INFINITY : passed_s, false);
+            update_tank(r, body, r->booked_J);
+        stiffen(r, step->finds_balance ? INFINITY : passed_s);
     }
     if (good) {
         before_J = r->model.energy(r->model.self, body);
         changed = leave(r, body, before_J);
-        if (!changed) show(r);
+        if (!changed) apply_regions(r);
     }
     const bool entered = enter(r, is_pressed(body));
     if (entered && !good) before_J = r->model.energy(r->model.self, body);
@@ -562,7 +564,7 @@ static bool update(pal_recovery *r, pal_step *step, double passed_s)
     if (r->n_region == 0) r->tank_J = r->debt_J = 0;
     if (r->n_region == 0) return changed;
     r->booked_J = total_J(step);
-    remember(r, body);
+    save_loads(r, body);
     return changed;
 }
 

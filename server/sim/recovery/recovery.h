@@ -42,8 +42,8 @@ typedef struct pal_recovery_model {
     /* node pairs of the edges of e, of which there are at most PAL_RECOVERY_EDGES_MAX; their number. They connect its
      * nodes and are in the pattern of an assembled matrix. [load] */
     int (*edges)(const void *self, int e, int32_t out[][2]);
-    /* the part of k of the edge between two nodes that e has, N/m */
-    double (*stiffness_N_m)(const void *self, int e, int a, int b);
+    /* what e adds to k of each of its edges, N/m */
+    double (*stiffness_N_m)(const void *self, int e);
     /* least and largest ratio of volume to that at rest of the whole body: the one pass when nothing is inverted */
     void (*range)(void *self, const pal_body *body, double out[2]);
     /* the same of every element, and that at its middle: low, high, middle [n_element] */

@@ -34,8 +34,8 @@
 /* s. Time at rest after which a region is released; period of growth of one that does not recover */
 #define PAL_REGION_LEAVE_S (4 * PAL_REGION_GROW_S)
 #define PAL_REGION_GROW_S  0.5
-/* next to nothing: of the energy that is stored, the motion of a body at rest or what a return may add; of the box
- * diagonal, the move of a body that is stuck; of load_cap_N, a load that holds nothing inverted
+/* next to nothing: of the energy that is stored, the motion of a body at rest or what a return may add; of
+ * load_cap_N, a load that holds nothing inverted
  * (tests/sim/elements/test_hex_recovery.c) */
 #define PAL_REST_SHARE 1e-3
 
