@@ -284,6 +284,8 @@ case "${1-}" in
     "$2/bin/palpate" robustness --generate "$3" --model "$4" --seconds 120 --table "$families.new" || [ -s "$families.new" ]
     {
         families_text
+        echo "Organs: $3. Models: $4. 120 s of processor time for each scene."
+        echo
         cat "$families.new"
     } >"$families"
     rm "$families.new"
