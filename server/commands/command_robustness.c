@@ -77,7 +77,7 @@ static number_text format(const char *format, double value, bool known)
 
 static void print_result(const pal_robustness_result *r)
 {
-    static const char *const answer[] = {"-", "NO", "yes"};
+    static const char *const answer[] = {"-", "no", "yes"};
     char safeguards[64] = "";
     const number_text returns = format("%.3g", r->return_s, true),
                       contact = format("%.2g", r->peak_contact_N / r->contact_cap_N, r->peak_contact_N > 0),
@@ -103,7 +103,7 @@ static void print_job(const pal_robustness_job *job)
            report->rests  ? "comes to rest by itself"
            : report->led  ? "has a prescribed motion without end: compared with an unloaded run"
            : report->late ? "does not come to rest by itself in the time"
-                          : "DOES NOT COME TO REST by itself");
+                          : "does not come to rest by itself");
     printf("%-11s %-10s %-4s %-9s %9s %8s %9s %9s %8s %8s %7s  %s\n", "case", "verdict", "safe", "recovered",
            "returns s", "force/cap", "energy +", "excluded", "% S left", "sim s", "cpu s", "what happened");
     for (int k = 0; k < report->n; k++)
@@ -394,13 +394,20 @@ int command_robustness(int argc, char **argv)
     if (n == 0 && !generate) return pal_flags_wrong(&common, "needs a SCENE or --generate");
     static pal_robustness_job job[JOBS];
     for (int k = 0; k < n; k++) snprintf(job[k].word, sizeof job[k].word, "%s", word[k]);
+    const int n_scene = n;
+    pal_diagnostic diag = {""};
     if (generate) n = list_organs(job, n, generate, models);
+    for (int k = n_scene; k < n; k++) {
+        int family;
+        uint64_t number;
+        if (pal_organ_name_read(job[k].word, &family, &number, &diag))
+            return pal_flags_wrong(&common, "--generate: %s", diag.text);
+    }
     if (picture && n > 1) return pal_flags_wrong(&common, "--picture: goes with one scene");
     pal_robustness_options options;
     pal_robustness_default(&options);
     options.seed = (uint64_t)seed, options.max_cpu_s = seconds, options.only = only;
     if (n == 1) options.progress = pal_report_continue, options.user = &common;
-    pal_diagnostic diag = {""};
     pal_err err = run(job, n, &options, table_path, &diag);
     pal_report_progress(NULL, 0, &common);
     if (!err && picture) err = draw(job[0].report, job[0].title, picture, &diag);

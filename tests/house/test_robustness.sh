@@ -164,7 +164,7 @@ end
 begin "a generated organ runs as a model that is asked for"
 gives 0 --generate branched:5 --model fem --only inside --seconds 20 --json
 check "it is safe" has out '"name":"branched:5","model":"fem".*"safe":true,"recovered":true'
-gives 1 --generate round:1 --model fem --only inside
+gives 2 --generate round:1 --model fem --only inside
 check "one line" [ "$(wc -l <err)" -eq 1 ]
 gives 2 --generate lobed:1 --model wax
 gives 2

@@ -229,8 +229,7 @@ static void add_island(shape *s)
     s->n_island++;
 }
 
-/* REFUSED: not a name; else family and seed */
-static pal_err parse(const char *name, int *family, uint64_t *seed, pal_diagnostic *diag)
+pal_err pal_organ_name_read(const char *name, int *family, uint64_t *seed, pal_diagnostic *diag)
 {
     for (*family = 0; *family < N_FAMILY; ++*family) {
         const char *word = families[*family].name, *number = name + strlen(word) + 1;
@@ -249,7 +248,7 @@ pal_err pal_organ_generate(const char *name, pal_generated_organ *out, pal_diagn
     int family = 0;
     uint64_t seed = 0;
     double low[3], high[3], longest = 0;
-    PAL_TRY(parse(name, &family, &seed, diag));
+    PAL_TRY(pal_organ_name_read(name, &family, &seed, diag));
     shape s = {.seed = seed * N_FAMILY + (uint64_t)family, .axis = {1, 1, 1}};
     *out = (pal_generated_organ){.gravity = seed % 2 == 1, .n_island = draw_count(&s, 0, ISLANDS)};
     out->young_Pa = 1e3 * pow(50, draw(&s, 0, 1));

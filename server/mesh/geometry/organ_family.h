@@ -26,6 +26,8 @@ typedef struct pal_generated_organ {
 
 /* "slender", "branched", "thin-walled", "lobed"; NULL: there are fewer [any] */
 const char *pal_organ_family_name(int index);
-/* name: "FAMILY:SEED". REFUSED: no such family, or a seed that is no whole number; MEMORY */
+/* name: "FAMILY:SEED". REFUSED: no such family, or a seed that is no whole number */
+pal_err pal_organ_name_read(const char *name, int *family, uint64_t *seed, pal_diagnostic *diag);
+/* the organ of that name. REFUSED: as above; MEMORY */
 pal_err pal_organ_generate(const char *name, pal_generated_organ *out, pal_diagnostic *diag);
 #endif

@@ -249,7 +249,6 @@ static void find_contact(central *solver, const pal_step *step)
         const pal_effect *effect = step->contact[i].effect;
         if (effect->bounds.stiffness) effect->bounds.stiffness(step->contact[i].self, step->body, solver->bound);
         if (effect->bounds.wanted) effect->bounds.wanted(step->contact[i].self, step->body, solver->bound);
-        if (effect->bounds.wanted) effect->bounds.wanted(step->contact[i].self, step->body, solver->bound);
     }
     solver->contact2 = find_bound(solver);
     memset(solver->bound, 0, n_byte);
