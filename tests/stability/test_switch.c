@@ -317,41 +317,53 @@ static void grasps_transfer_between_surfaces(void)
     end(&b);
 }
 
-/* a tool that drags the tip of finite elements sideways by friction goes on dragging: friction begins anew, and tissue
- * that is still sheared pulls at once on the tool that holds it */
+/* finite elements at rest, then pressed and dragged sideways by a tool with friction, off_m farther along the beam */
+static pal_world *dragged(const beam *b, int i, double off_m)
+{
+    pal_world *w = open_world(&b->set[i]->scene);
+    step(w, 1.0 / 60, 60);
+    double z = WIDTH + 0.015 + tip_z(w);
+    for (int k = 0; k < 80; k++) {
+        double down = k < 40 ? 0.0002 * k : 0.008, side = k < 40 ? 0 : 0.0001 * (k - 40);
+        pal_pose p = at(0.19 + off_m, 0.025 + side, z - down, 0);
+        pal_world_pose(w, 0, &p);
+        step(w, 1.0 / 60, 1);
+    }
+    return w;
+}
+
+/* friction goes on holding: the same body with the same force, other elements within 5 % across and downward (along the
+ * beam they rest elsewhere, and their force differs). And its force follows from the motion, not from rounding: a path
+ * that is off by a nanometre gives the same force (up to 0.7 N of 1.2 N off while friction was as stiff as all points
+ * near the tool) */
 static void friction_holds_on(void)
 {
-    const int pair[2][2] = {{0, 1}, {1, 0}};
-    for (int n = 0; n < 2; n++) {
-        beam b;
-        begin(&b, false, true, 20);
-        pal_entry_put_number(&b.scene->body[0].effect[1], "friction", 1, NULL);
-        add_configuration(&b, &full[pair[n][0]]), add_configuration(&b, &full[pair[n][1]]);
-        pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene);
-        pal_transfer *x = make_transfer(&b, 0, 1);
+    const int pair[3][2] = {{0, 0}, {0, 1}, {1, 0}};
+    beam b;
+    begin(&b, false, true, 20);
+    pal_entry_put_number(&b.scene->body[0].effect[1], "friction", 1, NULL);
+    add_configuration(&b, &full[0]), add_configuration(&b, &full[1]);
+    for (int n = 0; n < 3; n++) {
+        const int from = pair[n][0], to = pair[n][1];
+        pal_world *w = dragged(&b, from, 0), *beside = dragged(&b, from, 1e-9), *next = open_world(&b.set[to]->scene);
+        pal_transfer *x = make_transfer(&b, from, to);
         pal_transfer_report r;
-        step(w, 1.0 / 60, 60);
-        double z = WIDTH + 0.015 + tip_z(w);
-        for (int k = 0; k < 80; k++) {
-            double down = k < 40 ? 0.0002 * k : 0.008, side = k < 40 ? 0 : 0.0001 * (k - 40);
-            pal_pose p = at(0.19, 0.025 + side, z - down, 0);
-            pal_world_pose(w, 0, &p);
-            step(w, 1.0 / 60, 1);
-        }
-        const pal_tool *before = &pal_world_tools(w)->tool[0], *after = &pal_world_tools(next)->tool[0];
-        CHECK(fabs(before->mean_force_N[1]) > 0.05);
+        const double *was = pal_world_tools(w)->tool[0].mean_force_N, *is = pal_world_tools(next)->tool[0].mean_force_N;
+        const double *same = pal_world_tools(beside)->tool[0].mean_force_N;
         pal_transfer_apply(x, next, w, &r);
-        step(w, 1.0 / 60, 6), step(next, 1.0 / 60, 6);
-        const double *was = before->mean_force_N, *is = after->mean_force_N;
+        step(w, 1.0 / 60, 6), step(beside, 1.0 / 60, 6), step(next, 1.0 / 60, 6);
         if (table)
-            printf("  friction: %.3f, beside %.3f N; not switched %.3f, beside %.3f N\n", is[2], is[1], was[2], was[1]);
-        /* friction begins anew and is 12 % off at the most of the builds (measured without vector units) */
-        CHECK_NEAR(is[1], was[1], 0.15 * fabs(was[1]));
-        CHECK_NEAR(is[2], was[2], 0.1 * fabs(was[2]));
+            printf("  friction %d -> %d: %.4f, %.4f, %.4f N; not switched %.4f, %.4f, %.4f N\n", from, to, is[0], is[1],
+                   is[2], was[0], was[1], was[2]);
+        CHECK(fabs(was[1]) > 0.2);
+        CHECK_LE(pal_dist3(same, was), 1e-3 * pal_norm3(was));
+        if (from == to) CHECK_LE(pal_dist3(is, was), 0.005 * pal_norm3(was));
+        CHECK_NEAR(is[1], was[1], 0.05 * fabs(was[1]));
+        CHECK_NEAR(is[2], was[2], 0.05 * fabs(was[2]));
         pal_transfer_free(x);
-        pal_world_destroy(w), pal_world_destroy(next);
-        end(&b);
+        pal_world_destroy(w), pal_world_destroy(beside), pal_world_destroy(next);
     }
+    end(&b);
 }
 
 /* lasting loads: their sum and what they turn by stay, and so does where the body rests */

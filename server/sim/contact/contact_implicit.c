@@ -50,7 +50,7 @@ static void add_across(pal_contact_implicit *solve)
     int n = solve->n_contact;
     for (int i = 0; i < n; i++) {
         pal_axpy3(along, solve->force_N[i], contact[i].away);
-        stiffness += contact[i].k_N_m;
+        stiffness += solve->springs->k_N_m[solve->first + i];
         sum += solve->force_N[i];
     }
     if (!pal_unit3(along, along, 0) || !(sum > 0)) return;

@@ -31,7 +31,7 @@ static void add_friction(pal_push *push, pal_tool_contact *t, const double sum[3
         pal_contact_points_at(&push->points, t->contact[i].point, push->points.v, v);
         pal_axpy3(drift, -pal_norm3(t->contact[i].force) / total, v);
     }
-    if (!pal_tool_contact_friction(t, along, stiffness, t->slip)) pal_axpy3(t->slip, dt_s, drift);
+    if (!pal_tool_contact_friction(t, stiffness, t->slip)) pal_axpy3(t->slip, dt_s, drift);
     pal_axpy3(t->slip, -pal_dot3(t->slip, along), along);
     double limit_m = push->friction * size / stiffness, slip = pal_norm3(t->slip);
     if (slip > limit_m) pal_scale3(t->slip, limit_m / slip, t->slip);

@@ -62,7 +62,7 @@ static void begin(pal_push *push, pal_tool_contact *t, const pal_tool *tool, pal
         t->contact[i].k_N_m *= scale;
         if (t->contact[i].depth_m > 0) stiffness += t->contact[i].k_N_m;
     }
-    (void)pal_tool_contact_friction(t, t->proxy.normal, stiffness, implicit->solve.next_slip_m);
+    (void)pal_tool_contact_friction(t, stiffness, implicit->solve.next_slip_m);
     pal_scale3(move, step->dt_s, t->proxy.v);
     pal_contact_implicit_begin(&implicit->solve, push->springs, step->body, t->contact, t->n_contact, push->friction,
                                move);

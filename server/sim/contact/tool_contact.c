@@ -128,12 +128,11 @@ void pal_tool_contact_blend(pal_tool_contact *h, pal_step *step, pal_tool *tool,
     tool->touching = tool->touching || hold->part > 0;
 }
 
-bool pal_tool_contact_friction(pal_tool_contact *h, const double along[3], double stiffness_N_m, double slip_m[3])
+bool pal_tool_contact_friction(pal_tool_contact *h, double stiffness_N_m, double slip_m[3])
 {
     if (!h->hold.friction_due || !(stiffness_N_m > 0) || !(h->hold.share < 1)) return false;
     h->hold.friction_due = false;
-    /* on tissue, across; contact has 1 - s of its stiffness as yet */
+    /* on tissue; contact has 1 - s of its stiffness as yet */
     pal_scale3(slip_m, -(1 - h->hold.share) / stiffness_N_m, h->hold.total_N);
-    pal_axpy3(slip_m, -pal_dot3(slip_m, along), along);
     return true;
 }

@@ -69,8 +69,9 @@ void pal_tool_contact_transfer(pal_tool_contact *to, const pal_body *body, const
                                double k_N_m);
 /* before contact in a sub-step: s F to body->load and the tool. here_m: the tool, body frame */
 void pal_tool_contact_blend(pal_tool_contact *h, pal_step *step, pal_tool *tool, const double here_m[3]);
-/* stretch of friction by the transferred force across, once; stiffness of all contacts now. True: slip_m is set */
-bool pal_tool_contact_friction(pal_tool_contact *h, const double along[3], double stiffness_N_m, double slip_m[3]);
+/* stretch of friction by the transferred force, also along contact, once; stiffness of the contacts that act now. True:
+ * slip_m is set */
+bool pal_tool_contact_friction(pal_tool_contact *h, double stiffness_N_m, double slip_m[3]);
 void pal_tool_contact_end_blend(pal_tool_contact *h); /* contact is alone again */
 void pal_tool_contact_free(pal_tool_contact *h);      /* heap memory */
 #endif
