@@ -39,14 +39,3 @@ bridged() {
     check "$1: force is felt (N)" "$(json force_max_N "$work/bridge_$1")" '>' 0.05
     check "$1: never more than the cap (N)" "$(json force_max_N "$work/bridge_$1")" '<=' 3
 }
-
-# expect_failure SENTENCE ACTUAL OPERATOR WANTED: a check that a fault on record fails; fails when it holds
-expect_failure() {
-    if holds "$2" "$3" "$4"; then
-        failed=$((failed + 1))
-        echo "FAIL $1 ($2 $3 $4): it holds now, make it a check"
-    else
-        passed=$((passed + 1))
-        echo "ok   $1: fails, as recorded ($2, wanted $3 $4)"
-    fi
-}
