@@ -1,0 +1,49 @@
+#!/bin/sh
+# A bridge by LCM through each profile of the rig, with a client of the same session beside it: the bridge feels and
+# recovers, the session goes on, and without fresh models the hand feels the free damping and nothing else. In a network
+# namespace of its own. Nothing here asserts a time. usage: test_rig_lcm.sh FOLDER_OF_PROGRAMS WATCH_FORCE
+bin=$1 watch_force=$2
+. "$(dirname "$0")/through.sh"
+own_network "$@"
+make_scene
+bus=239.255.76.67
+
+# through PROFILE CONDITION: until what the bridge waits for, on a server of its own, whose LCM numbers begin at 1
+through() {
+    start_server --port 0 --lcm "udpm://$bus:7667?ttl=0" --log info
+    shows "$work/serve.err" "$server_job" lcm_joined
+    start_rig "$1" --lcm "$bus:7667,$bus:7668"
+    timeout 120 "$bin/palpate-client" "$url" --script idle --seconds 110 --json >"$work/client_$1" 2>"$work/client_$1.err" &
+    client=$!
+    "$watch_force" "udpm://$bus:7668?ttl=0" PALPATE1/ball/TOOL/0 >"$work/force_$1" &
+    watch=$!
+    pids="$pids $watch"
+    timeout 120 "$bin/palpate-bridge" --server "udpm://$bus:7668?ttl=0" --session ball --tool 0 --origin 0,0,0.048 \
+        --device "$(device premium)" --seconds 110 --until "$2" --json >"$work/bridge_$1" 2>"$work/bridge_$1.err"
+    bridged "$1" $?
+    members 2
+    stop $client
+    check "$1: a client of the session sees every frame pass every check" $? == 0
+    check "$1: and keeps its connection" "$(json reconnects "$work/client_$1")" == 0
+    kill $watch
+    wait $watch 2>/dev/null
+    check "$1: the bridge's states are heard" "$(wc -l <"$work/force_$1")" '>' 100
+    check "$1: palpate-lcm is still the same" "$(grep -c lcm_joined "$work/serve.err")" == 1
+    stop "$server_job"
+    stop_rig
+    check "$1: the rig passes on all that it can" "$(json failed "$work/rig_$1")" == 0
+}
+
+for profile in lan 20 50 80 150 200; do through $profile models=40,poses=200,force_N=0.06; done
+# 300 models come before the outage at most
+through outage models=420,stale=1,force_N=0.06
+check "outage: the models of the bridge get stale" "$(json stale "$work/bridge_outage")" '>=' 1
+# models are stale after 0.5 s at most, the force has faded 0.5 s later, and a damping of 0.5 N s/m is left (README.md of
+# the bridge); a line may be half written; an age of more than an hour is that of no model
+free='NF == 4 && $1 > 1.01 && $1 < 3600'
+check "outage: states without a fresh model are heard" "$(awk "$free" "$work/force_outage" | wc -l)" '>' 50
+check "outage: then nothing but damping is felt (N)" "$(awk "$free"' { over = $2 - 0.5 * $3; if (over > max) max = over }
+    END { print max + 0 }' "$work/force_outage")" '<' 0.001
+check "outage: force is felt again" "$(awk 'NF == 4 { if ($1 > 1.01 && $1 < 3600) gap = 1; else if (gap && $2 > max) max = $2 }
+    END { print max + 0 }' "$work/force_outage")" '>' 0.05
+finish
