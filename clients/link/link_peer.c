@@ -1,6 +1,7 @@
 #include "clients/link/link_core.h"
 #include "server/base/clock.h"
 
+#include <netinet/tcp.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -10,6 +11,7 @@ enum {
     LINK_MESSAGE_MAX = 96 << 20, /* a frame of the largest part, or a delta of all triangles */
     LINK_SMALL_SOCKET = 16384,   /* receive buffer of a client that reads slowly on purpose */
     LINK_PAUSE_FIRST_MS = 250,
+    LINK_UNSENT = 2048, /* bytes that may wait in the socket: a dozen poses */
     LINK_PAUSE_MAX_MS = 5000
 };
 
@@ -348,6 +350,10 @@ static void link_established(pal_link *link, struct lws *wsi)
     link->up = true;
     link->pause_reading = false;
     link->read_ns = pal_clock_ns();
+    /* what is not on the wire yet stays here, where something newer replaces it: after an outage the server gets the
+     * newest pose, not thousands */
+    const int unsent = LINK_UNSENT;
+    setsockopt(lws_get_socket_fd(wsi), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent, sizeof unsent);
     if (link->o.read_bytes_s > 0) {
         const int small = LINK_SMALL_SOCKET;
         setsockopt(lws_get_socket_fd(wsi), SOL_SOCKET, SO_RCVBUF, &small, sizeof small);
