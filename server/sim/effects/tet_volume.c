@@ -107,11 +107,14 @@ static pal_recovery *recovery(void *self)
     return pal_spring_lattice_recovery(self);
 }
 
-/* without edges there is nothing that a region could have in their place */
+/* Without edges there is nothing that a region could have in the place of springs. These have derivatives however flat
+ * a tetrahedron is, so while there are regions what else is inverted waits for the next step */
 static unsigned recover(void *self, pal_step *step)
 {
     const pal_spring_lattice *l = ((const pal_spring_set *)self)->lattice;
-    return l && l->of[PAL_SPRING_DISTANCE] ? pal_recovery_update(l->recovery, step) : 0;
+    if (!l || !l->of[PAL_SPRING_DISTANCE]) return 0;
+    if (step->sub > 0 && pal_recovery_acts(l->recovery)) return PAL_INVERTED;
+    return pal_recovery_update(l->recovery, step);
 }
 
 /* a body under recovery does not sleep, however slow it is */
