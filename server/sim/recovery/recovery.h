@@ -1,4 +1,4 @@
-/* Recovery from element inversion of hexahedra and tetrahedra (springs and control cells: inverted_regions.h).
+/* Recovery from element inversion of hexahedra, tetrahedra and springs (control cells: inverted_regions.h).
  *
  * Elements have states of balance that are not the body's shape at rest: folded, mirrored, crumpled. Every element
  * keeps its own force while it can: with the nearest proper rotation it is the gradient of an energy that is finite for
@@ -24,7 +24,8 @@
  * elements in regions, of material or supports. A change that T cannot pay is made smaller: s begins at most so large
  * that the energy does not rise, and rises to 1 as T permits, within PAL_RECOVERY_STIFFEN_S at the fastest. Without
  * loads E + kinetic energy + T - debt never increases; debt is what the floor of s has put in (PAL_RECOVERY_SOFT_MIN),
- * and dissipation repays it before it fills T.
+ * and dissipation repays it before it fills T. Implicit solvers dissipate by themselves; under an explicit one a
+ * component adds pal_recovery_damp, as a body without drag would turn what it stores into motion that never ends.
  *
  * State (regions, s, debt, clocks) goes over to another body of the same elements, as at a switch of supports
  * (pal_recovery_transfer). T begins anew there, and where loads change: nobody sees more energy than at the change.

@@ -28,9 +28,7 @@
  * (tests/stability/test_fem_cases.c) */
 #define PAL_RECOVERY_LEAVE_STRAIN 0.2
 
-/* ---- regions (inverted_regions.h; tests/sim/springs/test_spring_recovery.c,
- * tests/sim/subdivision/test_cell_recovery.c)
- * ---- */
+/* ---- regions (inverted_regions.h; tests/sim/subdivision/test_cell_recovery.c) ---- */
 
 /* largest energy of elements that return, as a part of the sum of their moduli times volume: with more they would fly
  * apart */
