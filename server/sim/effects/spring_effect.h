@@ -8,7 +8,7 @@
 
 static inline void spring_select(const void *self, const pal_body *body)
 {
-    pal_recovery_select(pal_spring_lattice_recovery(self), body);
+    pal_recovery_select(((const pal_spring_set *)self)->recovery, body);
 }
 
 /* lifecycle.destroy of every kind */

@@ -77,34 +77,34 @@ PAL_INLINE void bound_kernel(const double *p[][3], pal_v8 w, pal_v8 kq, bool ben
 
 PAL_SPRING_MEMBERS(PAL_SPRING_VOLUME, 4)
 
+static pal_recovery *recovery(void *self)
+{
+    return ((pal_spring_set *)self)->recovery;
+}
+
 static pal_err run(void *self, pal_step *step)
 {
     PAL_TRY(spring_run(self, step));
-    pal_recovery_add_forces(pal_spring_lattice_recovery(self), step->body);
-    pal_recovery_damp(pal_spring_lattice_recovery(self), step->body);
+    pal_recovery_add_forces(recovery(self), step->body);
+    pal_recovery_damp(recovery(self), step->body);
     return PAL_ERR_OK;
 }
 
 static double energy(void *self, const pal_body *body)
 {
-    return spring_energy(self, body) + pal_recovery_energy(pal_spring_lattice_recovery(self), body->d, NULL);
+    return spring_energy(self, body) + pal_recovery_energy(recovery(self), body->d, NULL);
 }
 
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
     spring_stiffness(self, body, bound_N_m);
-    pal_recovery_bound(pal_spring_lattice_recovery(self), bound_N_m);
+    pal_recovery_bound(recovery(self), bound_N_m);
 }
 
 static void damping(void *self, const pal_body *body, double *bound_Ns_m)
 {
     spring_damping(self, body, bound_Ns_m);
-    pal_recovery_damping_bound(pal_spring_lattice_recovery(self), body, bound_Ns_m);
-}
-
-static pal_recovery *recovery(void *self)
-{
-    return pal_spring_lattice_recovery(self);
+    pal_recovery_damping_bound(recovery(self), body, bound_Ns_m);
 }
 
 /* Without edges there is nothing that a region could have in the place of springs. These have derivatives however flat
@@ -120,13 +120,13 @@ static unsigned recover(void *self, pal_step *step)
 /* a body under recovery does not sleep, however slow it is */
 static double settled_s(const void *self)
 {
-    return pal_recovery_acts(pal_spring_lattice_recovery(self)) ? INFINITY : 0;
+    return pal_recovery_acts(((const pal_spring_set *)self)->recovery) ? INFINITY : 0;
 }
 
 static void reset(void *self, const pal_body *body)
 {
     (void)body;
-    if (pal_spring_lattice_recovery(self)) pal_recovery_reset(pal_spring_lattice_recovery(self));
+    if (recovery(self)) pal_recovery_reset(recovery(self));
 }
 
 const pal_effect pal_effect_tet_volume = {PAL_EFFECT("tet_volume", FORCE),

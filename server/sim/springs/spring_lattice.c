@@ -114,7 +114,7 @@ pal_err pal_spring_lattice_join(pal_spring_set *set, const pal_build *build)
     memcpy(set->all, set->q, sizeof *set->q * n_lane);
     for (size_t s = 0; s < n_side; s++)
         if (set->of_tet[s] >= 0) set->around[set->simd_blocks.place[set->of_tet[s]]]++;
-    set->lattice = l, l->of[set->spring.kind] = set;
+    set->lattice = l, set->recovery = l->recovery, l->of[set->spring.kind] = set;
     pal_recovery_refresh(l->recovery);
     return PAL_ERR_OK;
 }
@@ -123,6 +123,6 @@ void pal_spring_lattice_leave(pal_spring_set *set)
 {
     if (!set->lattice) return;
     set->lattice->of[set->spring.kind] = NULL;
-    pal_recovery_reset(set->lattice->recovery);
-    set->lattice = NULL;
+    pal_recovery_reset(set->recovery);
+    set->lattice = NULL, set->recovery = NULL;
 }

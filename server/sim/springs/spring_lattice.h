@@ -30,9 +30,4 @@ pal_err pal_spring_lattice_make(pal_body *body, pal_arena *arena);
 pal_err pal_spring_lattice_join(pal_spring_set *set, const pal_build *build);
 /* the set's component is removed: regions end, and all other springs act */
 void pal_spring_lattice_leave(pal_spring_set *set);
-/* recovery of the set's body; NULL: none */
-static inline pal_recovery *pal_spring_lattice_recovery(const pal_spring_set *set)
-{
-    return set->lattice ? set->lattice->recovery : NULL;
-}
 #endif

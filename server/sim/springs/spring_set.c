@@ -2,7 +2,7 @@
 #include "server/sim/springs/spring_set.h"
 
 #include "server/base/vec3.h"
-#include "server/sim/springs/spring_lattice.h"
+#include "server/sim/recovery/recovery.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -131,7 +131,7 @@ pal_err pal_spring_set_material(void *self, const pal_body *body, const pal_mate
     pal_spring_set *set = self;
     pal_spring_material(&set->spring, body, material);
     if (set->whole) weigh(set, material);
-    pal_recovery_refresh(pal_spring_lattice_recovery(set));
+    pal_recovery_refresh(set->recovery);
     return PAL_ERR_OK;
 }
 

@@ -28,6 +28,7 @@ typedef struct pal_spring_set {
      * tetrahedron, -1: none; q of all of them, and how many there are around a spring. NULL: no recovery
      * [n_tet][pal_spring_sides], [n_lane], [n_lane] */
     struct pal_spring_lattice *lattice;
+    struct pal_recovery *recovery;
     int32_t *of_tet;
     double *all, *around;
     bool changed; /* q is not what bounds of stiffness were found for */
