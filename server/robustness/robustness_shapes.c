@@ -41,7 +41,7 @@ void pal_robustness_shape(pal_trial *trial)
     for (int b = 0; b < trial->scene->n_body; b++) {
         disturb_body(trial, b, how);
         trial->may_stay[b] =
-            !strcmp(trial->scene->body[b].model.name, "tet_springs") && !pal_world_body(trial->world, b)->recovery;
+            !strcmp(trial->scene->body[b].model.name, "tet_springs") && !pal_world_body(trial->world, b)->model.springs;
         trial->may_stop[b] = trial->may_stay[b] ||
                              (how == PAL_BLOWN_UP && pal_world_find_component(trial->world, b, "finite_guard") >= 0);
         springs = springs && trial->may_stay[b];

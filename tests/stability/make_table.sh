@@ -152,8 +152,7 @@ families_text() {
     cat <<'TEXT'
 `tests/stability/make_table.sh --families BUILD ORGANS MODELS` makes this section, kept in `by_family.md`. Organs drawn by family and seed
 (`server/mesh/geometry/organ_family.h`), for which nothing was tuned, run the cases of `palpate robustness`. Wanted are 100 % safe, and 95 %
-safe and recovered. A case that its processor time does not judge counts on neither side. Even seeds have no gravity, odd ones have;
-springs under gravity have no recovery from inversion and may collapse.
+safe and recovered. A case that its processor time does not judge counts on neither side. Even seeds have no gravity, odd ones have.
 
 TEXT
 }

@@ -103,6 +103,7 @@ typedef struct pal_body {
     struct {
         struct pal_adaptive_surface *adaptive;
         struct pal_subdivision_solid *solid; /* heap, freed by dofs.destroy */
+        struct pal_spring_lattice *springs;  /* NULL also: springs without recovery from inversion */
     } model;
 
     /* ---- forces ---- */
@@ -126,7 +127,6 @@ typedef struct pal_body {
     const float *fill;          /* share of material in each element, or tetrahedron where element is NULL; NULL: 1 */
     pal_node_order *node_order; /* memory order of the nodes for kernels; NULL: none made        */
     struct pal_active_nodes *active_nodes; /* packed working arrays (active_nodes.h); NULL: none made       */
-    struct pal_spring_recovery *recovery;  /* recovery of springs from inversion; NULL: none                */
 
     /* ---- solver ---- */
     bool implicit;         /* the solver takes stiffness implicitly: contact need not suit explicit steps            */

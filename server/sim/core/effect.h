@@ -182,7 +182,6 @@ typedef struct pal_effect {
 
     /* recovery from inversion */
     struct {
-        struct pal_spring_set *(*springs)(void *self); /* FORCE: the springs of the component (spring_recovery.h) */
         /* FORCE: looks for inverted elements and chooses what they run on from now on; solvers call it at the begin of
          * a sub-step */
         unsigned (*recover)(void *self, pal_step *step);

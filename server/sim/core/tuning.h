@@ -58,7 +58,7 @@ enum { PAL_SPRING_GRID_NODES_MAX = 1 << 20 };
 #define PAL_LOCK_FREE_POISSON 0.3
 /* least part of the material of a border voxel, and of the moduli of a region of inverted elements, so that no node is
  * left nearly without stiffness and mass (tests/sim/solvers/test_fem_dynamic.c,
- * tests/sim/springs/test_spring_recovery.c) */
+ * tests/sim/subdivision/test_cell_recovery.c) */
 #define PAL_FILL_MIN 0.02
 /* cut voxels with less inside are dropped, unless more than MAX_MISSING of the volume would go; then those below
  * PAL_FILL_MIN (tests/sim/core/test_configuration.c, at 0.02 tests/stability/test_switch_ball.c) */

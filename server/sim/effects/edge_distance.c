@@ -2,10 +2,8 @@
  * and the opposite on j, d from i to j (paper B section 4.1, F_D).
  *
  * Departures: erratum B1 (the paper's force lacks 1/l0^2). An edge shorter than 1e-9 of its rest length takes its
- * rest direction, so that a body collapsed to a plane or a point opens again. Near inverted tetrahedra the edges are
- * restored as vectors (spring_recovery.h); those forces and that energy belong to this component. */
-#include "server/sim/core/effect_list.h"
-#include "server/sim/springs/spring_recovery.h"
+ * rest direction, so that a body collapsed to a plane or a point opens again. */
+#include "server/sim/effects/spring_effect.h"
 
 #include <stdlib.h>
 
@@ -21,9 +19,9 @@ static void sum_bounds(edge_distance *e)
     for (int i = 0; i < e->n_dof; i++) e->node_bound[i] = 0;
     for (int i = 0; i < 2 * e->set.n_item; i++) {
         int lane = e->set.simd_blocks.place[i / 2];
-        const double q = e->set.all ? e->set.all[lane] : e->set.q[lane];
-        e->node_bound[e->set.item[i]] += 2 * q * e->set.w[lane] * e->set.w[lane];
+        e->node_bound[e->set.item[i]] += 2 * e->set.q[lane] * e->set.w[lane] * e->set.w[lane];
     }
+    e->set.changed = false;
 }
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
@@ -50,7 +48,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     if (e->set.spring.given)
         build->body->spring_young_Pa = pal_spring_young_Pa(&e->set, build->body, build->def->material.poisson);
     *self = e;
-    return PAL_ERR_OK;
+    return pal_spring_lattice_join(&e->set, build);
 }
 
 /* with q = (l/l0)^2 and r = 1/sqrt(q): C (d/l)/l0 = (1 - r) d/l0^2 */
@@ -80,66 +78,42 @@ static void reopen(const pal_spring_set *set, const pal_body *body)
     }
 }
 
-static pal_spring_set *springs(void *self)
-{
-    return self;
-}
-
 static pal_err run(void *self, pal_step *step)
 {
     const edge_distance *e = self;
     pal_body *body = step->body;
+    spring_select(self, body);
     pal_node_order_load(body->node_order, body->d);
     double min = pal_spring_run(&e->set, body->node_order, kernel, 2);
     pal_node_order_add(body->node_order, body->f);
     if (min < PAL_ROUNDING * PAL_ROUNDING) reopen(&e->set, body);
-    if (e->set.n_off > 0) pal_spring_recovery_force(body->recovery, &e->set, body);
     if (e->set.spring.c_Js > 0) pal_spring_damp(&e->set, body, PAL_SPRING_DISTANCE);
     return PAL_ERR_OK;
 }
 
 static double energy(void *self, const pal_body *body)
 {
-    const pal_spring_set *set = &((edge_distance *)self)->set;
-    const double sum = pal_spring_energy(set, body, PAL_SPRING_DISTANCE);
-    return set->n_off > 0 ? sum + pal_spring_recovery_energy(body->recovery, set, body) : sum;
+    spring_select(self, body);
+    return pal_spring_energy(self, body, PAL_SPRING_DISTANCE);
 }
 
-static void reset(void *self, const pal_body *body)
+static void add_bounds(edge_distance *e, const pal_body *body, double constant, double *bound)
 {
-    (void)self;
-    if (body->recovery) pal_spring_recovery_reset(body->recovery);
-}
-
-/* a body under inversion recovery does not sleep, however slow it is */
-static double settled_s(const void *self)
-{
-    return ((const edge_distance *)self)->set.n_off > 0 ? INFINITY : 0;
+    spring_select(e, body);
+    if (e->set.changed) sum_bounds(e);
+    for (int i = 0; i < body->n_dof; i++) bound[i] += constant * e->node_bound[i];
 }
 
 /* |g| = 1/l0 at both ends whatever the deformation; the stiffness across the edge, k C/(l l0), is at most that along
  * it for l > l0 and zero for l < l0 */
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
-    const edge_distance *e = self;
-    for (int i = 0; i < body->n_dof; i++) bound_N_m[i] += e->set.spring.k_J * e->node_bound[i];
+    add_bounds(self, body, ((const pal_spring_set *)self)->spring.k_J, bound_N_m);
 }
 
 static void damping(void *self, const pal_body *body, double *bound_Ns_m)
 {
-    const edge_distance *e = self;
-    /* of inverted regions: stiffness times duration; nodes outside have less */
-    const double c_Js = e->set.spring.c_Js + (e->set.n_off > 0 ? body->recovery->damp_s * e->set.spring.k_J : 0);
-    for (int i = 0; i < body->n_dof; i++) bound_Ns_m[i] += c_Js * e->node_bound[i];
-}
-
-/* material regions change the weights */
-static pal_err edit(void *self, const pal_body *body, const pal_material *material, pal_diagnostic *diag)
-{
-    edge_distance *e = self;
-    PAL_TRY(pal_spring_set_material(self, body, material, diag));
-    if (e->set.whole) sum_bounds(e);
-    return PAL_ERR_OK;
+    add_bounds(self, body, ((const pal_spring_set *)self)->spring.c_Js, bound_Ns_m);
 }
 
 /* constants of material regions at the nodes: means over their springs */
@@ -170,11 +144,9 @@ static void measure(void *self, const pal_body *body, pal_field field, double *s
 }
 
 const pal_effect pal_effect_edge_distance = {PAL_EFFECT("edge_distance", FORCE),
+                                             .destroy = spring_destroy,
                                              .internal = true,
                                              .energy = energy,
-                                             .sleep.settled_s = settled_s,
                                              .bounds = {.stiffness = stiffness, .damping = damping},
-                                             .recovery = {.springs = springs, .recover = pal_spring_recover},
-                                             .reset = reset,
-                                             .material = edit,
+                                             .material = pal_spring_set_material,
                                              .inspect = {.measure = measure, .fields = 1u << PAL_FIELD_STIFFNESS_J}};

@@ -19,7 +19,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     pal_err err = pal_spring_set_make(PAL_SPRING_AREA, item, build, face, n_face, 2e-12 * size * size, set);
     free(face);
     *self = set;
-    return err;
+    return err ? err : pal_spring_lattice_join(set, build);
 }
 
 /* with q = (A/A0)^2 and r = 1/sqrt(q): C n/|n| = (1 - r) n w, and the gradients are crosses of n with the edges */
@@ -57,4 +57,14 @@ PAL_INLINE void bound_kernel(const double *p[][3], pal_v8 w, pal_v8 kq, bool ben
     for (int c = 0; c < 3; c++) bound[c] = along * length[c] * sum + flat;
 }
 
-PAL_SPRING_EFFECT(face_area, PAL_SPRING_AREA, 3)
+PAL_SPRING_MEMBERS(PAL_SPRING_AREA, 3)
+
+const pal_effect pal_effect_face_area = {.name = "face_area",
+                                         .stage = PAL_STAGE_FORCE,
+                                         .make = make,
+                                         .run = spring_run,
+                                         .destroy = spring_destroy,
+                                         .internal = true,
+                                         .energy = spring_energy,
+                                         .bounds = {.stiffness = spring_stiffness, .damping = spring_damping},
+                                         .material = pal_spring_set_material};

@@ -5,7 +5,8 @@
  * by the order of the corners). A tetrahedron with V0 below 1e-6 h^3 is omitted, and so is a sliver with less than
  * 0.01 of the volume of a regular one with its edges: its negligible volume would set the sub-step of the whole
  * body, and it would invert at any contact. The edges of omitted tetrahedra stay; a preflight check counts and names
- * them. */
+ * them. The component runs the body's recovery from inversion: forces and energy of regions belong to it
+ * (spring_lattice.h). */
 
 #include "server/sim/effects/spring_effect.h"
 
@@ -31,7 +32,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
                              : PAL_ERR_MEMORY;
     free(tet);
     *self = set;
-    return err;
+    return err ? err : pal_spring_lattice_join(set, build);
 }
 
 PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *min)
@@ -74,4 +75,66 @@ PAL_INLINE void bound_kernel(const double *p[][3], pal_v8 w, pal_v8 kq, bool ben
     bound[3] += c * (length[0] + length[1] + length[3]);
 }
 
-PAL_SPRING_EFFECT(tet_volume, PAL_SPRING_VOLUME, 4)
+PAL_SPRING_MEMBERS(PAL_SPRING_VOLUME, 4)
+
+static pal_recovery *recovery(void *self)
+{
+    return ((pal_spring_set *)self)->recovery;
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    PAL_TRY(spring_run(self, step));
+    pal_recovery_add_forces(recovery(self), step->body);
+    pal_recovery_damp(recovery(self), step->body);
+    return PAL_ERR_OK;
+}
+
+static double energy(void *self, const pal_body *body)
+{
+    return spring_energy(self, body) + pal_recovery_energy(recovery(self), body->d, NULL);
+}
+
+static void stiffness(void *self, const pal_body *body, double *bound_N_m)
+{
+    spring_stiffness(self, body, bound_N_m);
+    pal_recovery_bound(recovery(self), bound_N_m);
+}
+
+static void damping(void *self, const pal_body *body, double *bound_Ns_m)
+{
+    spring_damping(self, body, bound_Ns_m);
+    pal_recovery_damping_bound(recovery(self), body, bound_Ns_m);
+}
+
+/* Without edges there is nothing that a region could have in the place of springs. These have derivatives however flat
+ * a tetrahedron is, so while there are regions what else is inverted waits for the next step */
+static unsigned recover(void *self, pal_step *step)
+{
+    const pal_spring_lattice *l = ((const pal_spring_set *)self)->lattice;
+    if (!l || !l->of[PAL_SPRING_DISTANCE]) return 0;
+    if (step->sub > 0 && pal_recovery_acts(l->recovery)) return PAL_INVERTED;
+    return pal_recovery_update(l->recovery, step);
+}
+
+/* a body under recovery does not sleep, however slow it is */
+static double settled_s(const void *self)
+{
+    return pal_recovery_acts(((const pal_spring_set *)self)->recovery) ? INFINITY : 0;
+}
+
+static void reset(void *self, const pal_body *body)
+{
+    (void)body;
+    if (recovery(self)) pal_recovery_reset(recovery(self));
+}
+
+const pal_effect pal_effect_tet_volume = {PAL_EFFECT("tet_volume", FORCE),
+                                          .destroy = spring_destroy,
+                                          .reset = reset,
+                                          .internal = true,
+                                          .energy = energy,
+                                          .sleep.settled_s = settled_s,
+                                          .bounds = {.stiffness = stiffness, .damping = damping},
+                                          .recovery = {.recover = recover, .state = recovery},
+                                          .material = pal_spring_set_material};

@@ -5,7 +5,7 @@
  * c_area_Js, c_volume_Js (damping of the constraint, 0), weights ("equal": every spring of a kind has its constant,
  * "volume": in proportion to its volume and size, spring_law.h; absent: equal where constants are given, volume where
  * they are derived), fill (true: where the surface cuts voxels of known filled shares, weights by volume and masses
- * count the part inside), recover (true: recovery from inversion, spring_recovery.h; not with gravity).
+ * count the part inside), recover (true: recovery from inversion, spring_lattice.h; with solver verlet or rk4).
  *
  * Derived constants and masses follow the regions of the body, given ones hold for all of them. Constants that vary
  * over the body are on its spring_grid (paper B section 3.5) in place of their keys; with a grid there are area springs
@@ -13,7 +13,7 @@
  * same moduli without area springs, in about half the time. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
-#include "server/sim/springs/spring_recovery.h"
+#include "server/sim/springs/spring_lattice.h"
 
 #include <string.h>
 
@@ -110,15 +110,11 @@ static pal_err build(pal_config_entry *item, pal_build *build, pal_component_lis
     PAL_TRY(pal_spring_grid_check(build->def, build->diag));
     PAL_TRY(list(item, build, out));
     PAL_TRY(take_fill(item, build));
-    /* regions are softer than springs, so weight would stretch them; explicit solvers alone look for inversions */
     const char *solver = build->def->solver.name;
-    bool can = !solver[0] || !strcmp(solver, "verlet") || !strcmp(solver, "rk4");
-    for (int i = 0; i < build->def->n_effect; i++) can = can && strcmp(build->def->effect[i].name, "gravity") != 0;
+    const bool can = !solver[0] || !strcmp(solver, "verlet") || !strcmp(solver, "rk4");
     bool recover = can;
     PAL_TRY(pal_entry_read_bool(item, "recover", &recover, build->diag));
-    if (recover && !can)
-        return PAL_REFUSE(build->diag, "%s.recover: goes with solver verlet or rk4 and without gravity only",
-                          item->path);
+    if (recover && !can) return PAL_REFUSE(build->diag, "%s.recover: goes with solver verlet or rk4 only", item->path);
     PAL_TRY(pal_entry_check_unused(item, build->diag));
 
     PAL_TRY(pal_body_allocate(body, build->arena, mesh->tets.n_node));
@@ -132,7 +128,7 @@ static pal_err build(pal_config_entry *item, pal_build *build, pal_component_lis
     body->display.surface = &mesh->surface;
     body->display.skin = mesh->skin.n_vertex > 0 ? &mesh->skin : NULL;
     body->edge_m = mesh->tets.edge_m;
-    if (recover) PAL_TRY(pal_spring_recovery_make(body->n_node, build->arena, &body->recovery));
+    if (recover) PAL_TRY(pal_spring_lattice_make(body, build->arena));
     return pal_node_order_make(body->x_rest, body->n_node, body->edge_m, build->arena, &body->node_order);
 }
 

@@ -1,5 +1,5 @@
-/* Regions of inverted elements: what they run on until they have recovered. Models (springs/spring_recovery.h,
- * subdivision/cell_kernel.h) detect inversion and choose the elements of each region.
+/* Regions of inverted elements: what they run on until they have recovered. A model
+ * (subdivision/cell_kernel.h) detects inversion and chooses the elements of each region.
  *
  * Elements, and lattices of springs, have states of balance that are not the body's shape at rest: mirrored, folded,
  * crumpled. In a region the edges of its elements act instead, as vectors,

@@ -5,6 +5,7 @@
 #include "server/base/vec3.h"
 #include "server/num/union_find.h"
 #include "server/sim/core/best_rotation.h"
+#include "server/sim/core/rigid_motion.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -112,7 +113,7 @@ void pal_recovery_reset(pal_recovery *r)
 
 void pal_recovery_refresh(pal_recovery *r)
 {
-    if (r->n_region > 0) apply_regions(r);
+    if (pal_recovery_acts(r)) apply_regions(r);
 }
 
 void pal_recovery_transfer(pal_recovery *r, const pal_recovery *from)
@@ -240,6 +241,65 @@ void pal_recovery_bound(const pal_recovery *r, double *bound_N_m)
 {
     for (int n = 0; n < n_acting(r); n++)
         for (int b = 0; b < 2; b++) bound_N_m[ends(r, r->active[n])[b]] += 2 * scaled(r, r->active[n]);
+}
+
+/* ---- damping ---- */
+
+/* c of an edge, Ns/m: PAL_RECOVERY_DAMPING of what is critical for its ends alone on it */
+static double edge_damping(const pal_recovery *r, const pal_body *body, int edge)
+{
+    const int32_t *end = ends(r, edge);
+    double inverse_1_kg = 0;
+    for (int b = 0; b < 2; b++)
+        if (body->interpolation || !body->support[end[b]]) inverse_1_kg += 1 / body->node_mass_kg[end[b]];
+    return inverse_1_kg > 0 ? 2 * PAL_RECOVERY_DAMPING * sqrt(scaled(r, edge) / inverse_1_kg) : 0;
+}
+
+/* w = A^-1 sum c x x v, A = sum c (x.x I - x x') */
+static void find_spins(pal_recovery *r, const pal_body *body)
+{
+    for (int p = 0; p < r->n_region; p++)
+        memset(r->of[p].sum, 0, sizeof r->of[p].sum), pal_set3(r->of[p].spin_1_s, 0, 0, 0);
+    for (int n = 0; n < r->n_active; n++) {
+        const int i = r->active[n];
+        pal_recovery_region *region = &r->of[r->edge_region[i]];
+        const double c = edge_damping(r, body, i);
+        double x[3], rate[3], moment[3];
+        edge_vector(body->d, ends(r, i), x), edge_vector(body->dv, ends(r, i), rate);
+        pal_add_outer(region->sum, -c, x, x);
+        for (int a = 0; a < 3; a++) region->sum[4 * a] += c * pal_dot3(x, x);
+        pal_cross3(moment, x, rate);
+        pal_axpy3(region->spin_1_s, c, moment);
+    }
+    for (int p = 0; p < r->n_region; p++) {
+        double moment[3];
+        pal_copy3(moment, r->of[p].spin_1_s);
+        pal_rigid_spin(r->of[p].sum, moment, 0, r->of[p].spin_1_s);
+    }
+}
+
+void pal_recovery_damp(pal_recovery *r, pal_body *body)
+{
+    if (n_acting(r) == 0) return;
+    const uint64_t before = pal_clock_ns();
+    find_spins(r, body);
+    for (int n = 0; n < r->n_active; n++) {
+        const int i = r->active[n];
+        const double c = edge_damping(r, body, i);
+        double x[3], rate[3], rotation[3];
+        edge_vector(body->d, ends(r, i), x), edge_vector(body->dv, ends(r, i), rate);
+        pal_cross3(rotation, r->of[r->edge_region[i]].spin_1_s, x);
+        pal_sub3(rate, rate, rotation);
+        pal_axpy3(body->f + 3 * (size_t)ends(r, i)[0], c, rate);
+        pal_axpy3(body->f + 3 * (size_t)ends(r, i)[1], -c, rate);
+    }
+    body->safeguards.ns += pal_clock_ns() - before;
+}
+
+void pal_recovery_damping_bound(const pal_recovery *r, const pal_body *body, double *bound_Ns_m)
+{
+    for (int n = 0; n < n_acting(r); n++)
+        for (int b = 0; b < 2; b++) bound_Ns_m[ends(r, r->active[n])[b]] += 2 * edge_damping(r, body, r->active[n]);
 }
 
 /* ---- choice of regions ---- */

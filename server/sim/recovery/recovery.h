@@ -1,4 +1,4 @@
-/* Recovery from element inversion of hexahedra and tetrahedra (springs and control cells: inverted_regions.h).
+/* Recovery from element inversion of hexahedra, tetrahedra and springs (control cells: inverted_regions.h).
  *
  * Elements have states of balance that are not the body's shape at rest: folded, mirrored, crumpled. Every element
  * keeps its own force while it can: with the nearest proper rotation it is the gradient of an energy that is finite for
@@ -24,7 +24,8 @@
  * elements in regions, of material or supports. A change that T cannot pay is made smaller: s begins at most so large
  * that the energy does not rise, and rises to 1 as T permits, within PAL_RECOVERY_STIFFEN_S at the fastest. Without
  * loads E + kinetic energy + T - debt never increases; debt is what the floor of s has put in (PAL_RECOVERY_SOFT_MIN),
- * and dissipation repays it before it fills T.
+ * and dissipation repays it before it fills T. Implicit solvers dissipate by themselves; under an explicit one a
+ * component adds pal_recovery_damp, as a body without drag would turn what it stores into motion that never ends.
  *
  * State (regions, s, debt, clocks) goes over to another body of the same elements, as at a switch of supports
  * (pal_recovery_transfer). T begins anew there, and where loads change: nobody sees more energy than at the change.
@@ -60,6 +61,7 @@ typedef struct pal_recovery_region {
     bool fixed;         /* G is the rotation of the supports                                     */
     double rotation[9]; /* G                                                                     */
     double sum[9];      /* sum_ij k (x_i - x_j)(X_i - X_j)', which G fits best                   */
+    double spin_1_s[3]; /* that fits the motion best, for damping                                */
     double scale;       /* s                                                                     */
     double energy_J;    /* s phi at the last evaluation                                          */
     double size_J;      /* sum_ij k |X_i - X_j|^2, 3 E V                                         */
@@ -102,7 +104,7 @@ pal_err pal_recovery_make(const pal_recovery_model *model, int n_node, const dou
                           pal_recovery **out);
 /* no regions, empty tank, all elements act */
 void pal_recovery_reset(pal_recovery *r);
-/* constants of the elements have changed */
+/* constants of the elements have changed. NULL: nothing */
 void pal_recovery_refresh(pal_recovery *r);
 /* takes over the state of `from`, of the same elements; else nothing */
 void pal_recovery_transfer(pal_recovery *r, const pal_recovery *from);
@@ -117,6 +119,10 @@ static inline bool pal_recovery_acts(const pal_recovery *r)
 
 /* the forces of the regions at the body's state, timed in body->safeguards */
 void pal_recovery_add_forces(pal_recovery *r, pal_body *body);
+/* Under an explicit solver, which does not damp by itself: forces against the motion of the edges in regions beside the
+ * rotation that fits best, so that momentum and angular momentum stay, and what they add to the bounds of damping */
+void pal_recovery_damp(pal_recovery *r, pal_body *body);
+void pal_recovery_damping_bound(const pal_recovery *r, const pal_body *body, double *bound_Ns_m);
 /* at nodes d: energy, J; f += forces; NULL: none */
 double pal_recovery_energy(pal_recovery *r, const double *d, double *f);
 /* Before energy, forces and linearise: while the body's d are its nodes at rest, for which solvers ask between steps,

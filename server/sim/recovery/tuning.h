@@ -20,13 +20,15 @@
 #define PAL_RECOVERY_WHOLE_S   2.0
 #define PAL_RECOVERY_STIFFEN_S 0.25
 #define PAL_RECOVERY_SOFT_MIN  0.02
+/* damping ratio of an edge of a region under an explicit solver, its ends alone on it: waves that drag would leave for
+ * seconds end in a few periods of the edges, for a sub-step shorter by an eighth
+ * (tests/sim/springs/test_spring_recovery.c) */
+#define PAL_RECOVERY_DAMPING 0.03
 /* mean strain, by energy, above which a region does not become elements: under a load they would be crushed at once
  * (tests/stability/test_fem_cases.c) */
 #define PAL_RECOVERY_LEAVE_STRAIN 0.2
 
-/* ---- regions (inverted_regions.h; tests/sim/springs/test_spring_recovery.c,
- * tests/sim/subdivision/test_cell_recovery.c)
- * ---- */
+/* ---- regions (inverted_regions.h; tests/sim/subdivision/test_cell_recovery.c) ---- */
 
 /* largest energy of elements that return, as a part of the sum of their moduli times volume: with more they would fly
  * apart */

@@ -23,6 +23,11 @@ PAL_INLINE int pal_spring_corner_count(pal_spring_kind kind)
 {
     return kind == PAL_SPRING_DISTANCE ? 2 : kind == PAL_SPRING_AREA ? 3 : 4;
 }
+/* edges, faces of a tetrahedron, and itself: 6, 4, 1 */
+PAL_INLINE int pal_spring_sides(pal_spring_kind kind)
+{
+    return kind == PAL_SPRING_DISTANCE ? 6 : kind == PAL_SPRING_AREA ? 4 : 1;
+}
 
 /* edges of a face opposite its corners, in turn, and twice the area vector; edges of a tetrahedron from corner 0 */
 PAL_INLINE void pal_spring_face_edges(const double *const x[PAL_CORNERS], double e[3][3], double n[3])

@@ -79,14 +79,16 @@ static void set_known(known *k, const int32_t *node, int n)
     }
 }
 
-/* adds every tetrahedron's volume (fill [n_tet] of it, unless NULL) times share [n_tet] to its sides with n_corner
- * corners */
-static void add_volumes(const pal_body *body, const double *share, const known *table, size_t n_item, int n_corner,
-                        double *out)
+pal_err pal_spring_find_sides(const pal_tets *tets, const int32_t *item, int n_item, int n_corner, int32_t *of_tet)
 {
-    const pal_tets *tets = body->tets;
-    for (int t = 0; t < tets->n_tet; t++) {
-        double volume = inside_m3(body, t) * (share ? share[t] : 1);
+    known *table = calloc((size_t)n_item + 1, sizeof *table);
+    if (!table) return PAL_ERR_MEMORY;
+    for (int i = 0; i < n_item; i++) {
+        set_known(&table[i], item + n_corner * i, n_corner);
+        table[i].item = i;
+    }
+    qsort(table, (size_t)n_item, sizeof *table, compare_known);
+    for (int t = 0; t < tets->n_tet; t++)
         for (unsigned set = 1; set < 16; set++) {
             if (__builtin_popcount(set) != n_corner) continue;
             int32_t node[4];
@@ -95,9 +97,20 @@ static void add_volumes(const pal_body *body, const double *share, const known *
                 if (set >> c & 1) node[n++] = tets->tet[4 * t + c];
             known key;
             set_known(&key, node, n_corner);
-            const known *found = bsearch(&key, table, n_item, sizeof key, compare_known);
-            if (found) out[found->item] += volume;
+            const known *found = bsearch(&key, table, (size_t)n_item, sizeof key, compare_known);
+            *of_tet++ = found ? found->item : -1;
         }
+    free(table);
+    return PAL_ERR_OK;
+}
+
+/* adds every tetrahedron's volume (fill [n_tet] of it, unless NULL) times share [n_tet] to its sides */
+static void add_volumes(const pal_body *body, const double *share, const int32_t *of_tet, int n_side, double *out)
+{
+    for (int t = 0; t < body->tets->n_tet; t++) {
+        double volume = inside_m3(body, t) * (share ? share[t] : 1);
+        for (int c = 0; c < n_side; c++)
+            if (of_tet[n_side * t + c] >= 0) out[of_tet[n_side * t + c]] += volume;
     }
 }
 
@@ -116,23 +129,20 @@ static double mean_square_edge(const double *x, const int32_t *node, int n)
 static pal_err sum_volumes(const pal_spring *spring, const pal_body *body, const double *share, const int32_t *item,
                            int n_item, int n_corner, double *out)
 {
-    known *table = calloc((size_t)n_item + 1, sizeof *table);
-    if (!table) return PAL_ERR_MEMORY;
-    for (int i = 0; i < n_item; i++) {
-        set_known(&table[i], item + n_corner * i, n_corner);
-        table[i].item = i;
-    }
-    qsort(table, (size_t)n_item, sizeof *table, compare_known);
-    memset(out, 0, sizeof *out * (size_t)n_item);
-    add_volumes(body, share, table, (size_t)n_item, n_corner, out);
+    const int n_side = pal_spring_sides(spring->kind);
+    int32_t *of_tet = malloc(sizeof *of_tet * ((size_t)n_side * (size_t)body->tets->n_tet + 1));
     double *all = spring->by_volume ? NULL : calloc((size_t)n_item + 1, sizeof *all);
-    if (all) {
-        add_volumes(body, NULL, table, (size_t)n_item, n_corner, all);
-        for (int i = 0; i < n_item; i++) out[i] = all[i] > 0 ? out[i] / all[i] : 0;
+    pal_err err = of_tet && (spring->by_volume || all)
+                      ? pal_spring_find_sides(body->tets, item, n_item, n_corner, of_tet)
+                      : PAL_ERR_MEMORY;
+    if (!err) {
+        memset(out, 0, sizeof *out * (size_t)n_item);
+        add_volumes(body, share, of_tet, n_side, out);
+        if (all) add_volumes(body, NULL, of_tet, n_side, all);
+        for (int i = 0; i < n_item && all; i++) out[i] = all[i] > 0 ? out[i] / all[i] : 0;
     }
-    bool made = spring->by_volume || all;
-    free(table), free(all);
-    return made ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    free(of_tet), free(all);
+    return err;
 }
 
 pal_err pal_spring_weights(const pal_spring *spring, const pal_body *body, const double *share, const int32_t *item,

@@ -44,6 +44,8 @@ pal_err pal_spring_read(pal_spring_kind kind, pal_config_entry *item, const pal_
  * tetrahedron, NULL: 1; MEMORY */
 pal_err pal_spring_weights(const pal_spring *spring, const pal_body *body, const double *share, const int32_t *item,
                            int n_item, int n_corner, double *out);
+/* of_tet [n_tet][sides of the kind]: the springs between corners of each tetrahedron, -1: no such spring; MEMORY */
+pal_err pal_spring_find_sides(const pal_tets *tets, const int32_t *item, int n_item, int n_corner, int32_t *of_tet);
 /* weight *= constants from the grid (nothing without one), and c_Js follows from them */
 void pal_spring_on_grid(pal_spring *spring, const pal_spring_grid *grid, const pal_body *body, const int32_t *item,
                         int n_item, int n_corner, double *weight);

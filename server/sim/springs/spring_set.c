@@ -2,7 +2,7 @@
 #include "server/sim/springs/spring_set.h"
 
 #include "server/base/vec3.h"
-#include "server/sim/recovery/inverted_regions.h"
+#include "server/sim/recovery/recovery.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -10,8 +10,7 @@
 
 /* ---- regions ---- */
 
-/* weights of the body's material as it is; those of regions keep what they give. What is off stays so until the next
- * update */
+/* weights of the body's material as it is */
 static void weigh(pal_spring_set *set, const pal_material *material)
 {
     double *q = set->all ? set->all : set->q;
@@ -23,7 +22,7 @@ static void weigh(pal_spring_set *set, const pal_material *material)
         for (int k = 0; k < 4; k++) q[i] += over[k] * set->part[k][i];
     }
     if (set->all) memcpy(set->q, q, sizeof *q * (size_t)set->simd_blocks.n_lane);
-    for (int k = 0; set->all && k < set->n_off; k++) set->q[set->simd_blocks.place[set->off[k]]] = 0;
+    set->changed = true;
 }
 
 /* what each tetrahedron counts, by what its region gives: nothing, E, Poisson's ratio, both [4][n_tet]; false: all are
@@ -94,17 +93,6 @@ static pal_err fill(pal_spring_set *set, const pal_build *build, double *weight)
     return take_regions(set, build, weight);
 }
 
-static pal_err keep_all(pal_spring_set *set, pal_arena *arena)
-{
-    set->all = PAL_NEW(arena, double, set->simd_blocks.n_lane);
-    set->off = PAL_NEW(arena, int32_t, set->n_item);
-    if (set->spring.kind == PAL_SPRING_DISTANCE) set->edge = PAL_NEW(arena, pal_region_edge, set->n_item);
-    if (!set->all || !set->off || (set->spring.kind == PAL_SPRING_DISTANCE && !set->edge)) return PAL_ERR_MEMORY;
-    set->fresh = true;
-    memcpy(set->all, set->q, sizeof *set->q * (size_t)set->simd_blocks.n_lane);
-    return PAL_ERR_OK;
-}
-
 pal_err pal_spring_set_check(const pal_config_entry *entry, const pal_build *build)
 {
     if (build->body->tets && build->body->tets->n_tet > 0 && build->body->node_order) return PAL_ERR_OK;
@@ -134,7 +122,7 @@ pal_err pal_spring_set_make(pal_spring_kind kind, pal_config_entry *entry, pal_b
     memcpy(out->item, item, n * sizeof *item);
     pal_err err = fill(out, build, weight);
     free(weight);
-    return err || !body->recovery ? err : keep_all(out, build->arena);
+    return err;
 }
 
 pal_err pal_spring_set_material(void *self, const pal_body *body, const pal_material *material, pal_diagnostic *diag)
@@ -143,6 +131,7 @@ pal_err pal_spring_set_material(void *self, const pal_body *body, const pal_mate
     pal_spring_set *set = self;
     pal_spring_material(&set->spring, body, material);
     if (set->whole) weigh(set, material);
+    pal_recovery_refresh(set->recovery);
     return PAL_ERR_OK;
 }
 

@@ -24,13 +24,14 @@ typedef struct pal_spring_set {
     /* with regions of other materials, q = part[0] + part[1]/E + part[2]/factor + part[3]/(E factor) of the body's E
      * and factor; whole is q without regions; NULL: no regions [n_lane] */
     double *part[4], *whole;
-    /* q where nothing is inverted, and the springs that recovery has switched off (spring_recovery.h); NULL: the body
-     * has no recovery [n_lane], [n_item] */
-    double *all;
-    int32_t *off;
-    struct pal_region_edge *edge; /* of an edge set: the springs that are off, with their region [n_off] */
-    int n_off;
-    bool fresh; /* made since recovery last chose what is off */
+    /* recovery from inversion (spring_lattice.h), which lowers q where elements do not act: the springs of each
+     * tetrahedron, -1: none; q of all of them, and how many there are around a spring. NULL: no recovery
+     * [n_tet][pal_spring_sides], [n_lane], [n_lane] */
+    struct pal_spring_lattice *lattice;
+    struct pal_recovery *recovery;
+    int32_t *of_tet;
+    double *all, *around;
+    bool changed; /* q is not what bounds of stiffness were found for */
 } pal_spring_set;
 
 /* REFUSED: the body is not made of tetrahedra */
@@ -39,7 +40,7 @@ pal_err pal_spring_set_check(const pal_config_entry *entry, const pal_build *bui
  * `min`, w = 1 / measure; item is reordered */
 pal_err pal_spring_set_make(pal_spring_kind kind, pal_config_entry *entry, pal_build *build, int32_t *item, int n_item,
                             double min, pal_spring_set *out);
-/* smallest and largest of 1 and the ratios of volume to volume at rest, whichever springs are off; d [n_node][3] */
+/* smallest and largest of 1 and the ratios of volume to volume at rest, whichever springs act; d [n_node][3] */
 void pal_spring_volume_range(const pal_spring_set *set, pal_node_order *node_order, const double *d, double out[2]);
 /* Young's modulus, Pa, for which a set of edges stands: that of a material whose derived constants have the same sum of
  * stiffness over all edges, sum k q/l0^2 = 6 f_d E V/h^2 */

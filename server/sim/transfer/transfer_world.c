@@ -1,8 +1,8 @@
 /* Transfer of a world (transfer_world.h). */
 #include "server/sim/transfer/transfer_world.h"
 
+#include "server/base/vec3.h"
 #include "server/sim/recovery/recovery.h"
-#include "server/sim/springs/spring_recovery.h"
 #include "server/sim/world/world_core.h"
 
 #include <string.h>
@@ -69,14 +69,11 @@ void pal_transfer_set_state(pal_body *body, const double *x, const double *v)
 static void transfer_body(pal_world *w, int b, const pal_body *from, const double *x, const double *v)
 {
     pal_body *to = &w->plan.body[b];
-    size_t n_byte = 3 * sizeof(double) * (size_t)to->n_dof;
     pal_transfer_set_state(to, x, v);
     to->frozen = from->frozen;
     memcpy(to->reason, from->reason, sizeof to->reason);
     to->safeguards = from->safeguards;
     to->stiffening_damping_1_s = from->stiffening_damping_1_s, to->stiffening_damping_s = from->stiffening_damping_s;
-    const bool same = to->recovery && from->recovery && to->n_node == from->n_node;
-    if (same && !memcmp(to->x_rest, from->x_rest, n_byte)) pal_spring_recovery_transfer(to->recovery, from->recovery);
     pal_world_invalidate_limits(w, b);
 }
 
