@@ -52,6 +52,11 @@ typedef struct pal_recovery_model {
     void (*act)(void *self, const uint8_t *on);
     /* energy of the acting elements, J */
     double (*energy)(void *self, const pal_body *body);
+    /* forces are no gradient of `energy` and may add to it: regions become elements when these store next to nothing */
+    bool no_gradient;
+    /* the group of e, below n_group: elements of a group enter a region together; n_group 0: there are none */
+    int n_group;
+    int (*group)(const void *self, int e);
 } pal_recovery_model;
 
 enum { PAL_RECOVERY_EDGES_MAX = 24, PAL_RECOVERY_REGIONS_MAX = 64 };
@@ -82,6 +87,7 @@ typedef struct pal_recovery {
     int32_t *edge_region;
     int32_t *region;            /* of each element, -1: none                                  [n_element]    */
     uint8_t *on;                /* element acts                                               [n_element]    */
+    uint8_t *enters;            /* an element of the group enters a region                    [n_group]      */
     float *low, *high, *middle; /* ratios at the last examination                     [n_element]    */
     int32_t *root;              /* working memory                                             [n_node]       */
     pal_recovery_region of[PAL_RECOVERY_REGIONS_MAX]; /* further regions share the last one's rotation   */

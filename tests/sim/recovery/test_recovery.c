@@ -100,7 +100,7 @@ static void a_region_grows_with_time_and_not_under_a_load(void)
         turn_over(&b);
         CHECK(look(&b, 10) & PAL_INVERSION_CHANGED);
         CHECK_INT(in_regions(r), 1);
-        CHECK_INT(look(&b, 10 + 0.9 * PAL_RECOVERY_WAIT_S), PAL_INVERTED);
+        CHECK_INT(look(&b, 10 + 0.9 * PAL_RECOVERY_WAIT_S), PAL_INVERTED | PAL_INVERSION_AT_REST);
         CHECK_INT(in_regions(r), 1);
         look(&b, 10 + PAL_RECOVERY_WAIT_S);
         CHECK_INT(in_regions(r), loaded ? 1 : 2);
