@@ -146,11 +146,11 @@ static void what_falls_over_its_foot_hangs_there(void)
     REQUIRE(open_soft(&s, "monster", 5000));
     int n_swing = 0;
     uint64_t n_look = 0;
-    for (int i = 0; i < 170; i++) {
+    for (int i = 0; i < 220; i++) {
         REQUIRE(solid_scene_step(&s, 1, solid_step_s));
         far = fmax(far, farthest(s.body));
         if (i == 99) n_swing = pal_world_substeps(s.world);
-        if (i == 159) n_look = s.body->safeguards.n_inversion;
+        if (i == 209) n_look = s.body->safeguards.n_inversion;
     }
     const int n_still = pal_world_substeps(s.world);
     printf("  %.2f S from rest at most, %d looks found patches, %d sub-steps, %d still\n", far / s.body->length_scale_m,

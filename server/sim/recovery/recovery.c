@@ -267,6 +267,15 @@ static bool is_pressed(const pal_body *body)
     return any;
 }
 
+/* weight draws a soft region out, by 1 / s, and that keeps it bad: it may grow again when it is stiff */
+static bool is_drawn_out(const pal_recovery *r, const pal_step *step)
+{
+    bool soft = false, weighs = false;
+    for (int p = 0; p < r->n_region; p++) soft |= r->of[p].scale < 1;
+    for (int i = 0; i < step->n_force; i++) weighs |= step->force[i].effect->energy && !step->force[i].effect->internal;
+    return soft && weighs;
+}
+
 /* which regions are bad */
 static void examine(pal_recovery *r, double passed_s)
 {
@@ -579,7 +588,7 @@ static bool update(pal_recovery *r, pal_step *step, double passed_s)
         changed = leave(r, body, before_J);
         if (!changed) apply_regions(r);
     }
-    const bool entered = enter(r, is_pressed(body));
+    const bool entered = enter(r, is_pressed(body) || is_drawn_out(r, step));
     if (entered && !good) before_J = r->model.energy(r->model.self, body);
     changed |= entered;
     if (changed) begin(r, body, before_J + regions_J(r));

@@ -24,7 +24,7 @@
  * (tests/stability/test_fem_cases.c) */
 #define PAL_RECOVERY_LEAVE_STRAIN 0.2
 
-/* ---- regions (inverted_regions.h; tests/sim/springs/test_spring_recovery.c,
+/* ---- regions (inverted_regions.h; tests/sim/springs/test_spring_recovery.c)
  * tests/sim/subdivision/test_cell_recovery.c)
  * ---- */
 
