@@ -24,9 +24,7 @@
  * (tests/stability/test_fem_cases.c) */
 #define PAL_RECOVERY_LEAVE_STRAIN 0.2
 
-/* ---- regions (inverted_regions.h; tests/sim/springs/test_spring_recovery.c)
- * tests/sim/subdivision/test_cell_recovery.c)
- * ---- */
+/* ---- regions of springs (inverted_regions.h; tests/sim/springs/test_spring_recovery.c) ---- */
 
 /* largest energy of elements that return, as a part of the sum of their moduli times volume: with more they would fly
  * apart */
@@ -38,14 +36,4 @@
  * load_cap_N, a load that holds nothing inverted
  * (tests/sim/elements/test_hex_recovery.c) */
 #define PAL_REST_SHARE 1e-3
-
-/* ---- stiffening damper (tests/sim/recovery/test_stiffening_damper.c) ---- */
-
-/* it begins when the energy rises by more than this factor and would move the body by more than its length scale in a
- * second */
-#define PAL_STIFFENING_RISE 10
-/* 1/w. It lasts until exp(-8) of the motion is left */
-#define PAL_STIFFENING_PERIODS 8
-/* s, after the last increase of the energy */
-#define PAL_STIFFENING_HOLD_S 0.1
 #endif

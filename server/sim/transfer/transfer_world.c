@@ -74,7 +74,6 @@ static void transfer_body(pal_world *w, int b, const pal_body *from, const doubl
     to->frozen = from->frozen;
     memcpy(to->reason, from->reason, sizeof to->reason);
     to->safeguards = from->safeguards;
-    to->stiffening_damping_1_s = from->stiffening_damping_1_s, to->stiffening_damping_s = from->stiffening_damping_s;
     const bool same = to->recovery && from->recovery && to->n_node == from->n_node;
     if (same && !memcmp(to->x_rest, from->x_rest, n_byte)) pal_spring_recovery_transfer(to->recovery, from->recovery);
     pal_world_invalidate_limits(w, b);
