@@ -93,8 +93,8 @@ static pal_err apply_material(pal_world *w, int b, const pal_material *given, pa
     return PAL_ERR_OK;
 }
 
-/* What an edit to a stiffer material has put into a deformed body would throw it about once it is soft again. So where the
- * modulus falls the motion keeps its amplitude, not its speed: with it fall the frequencies. A free body keeps its
+/* What an edit to a stiffer material has put into a deformed body would throw it about once it is soft again. So where
+ * the modulus falls the motion keeps its amplitude, not its speed: with it fall the frequencies. A free body keeps its
  * momentum */
 static void scale_motion(pal_body *body, double times)
 {
