@@ -21,7 +21,7 @@ const terms = {
     "foresee foreseen foresees foresight": "predict, predicted",
     "price priced prices": "cost",
     "rescue rescues rescued": "safeguards",
-    "brake brakes braked": "stiffening_damper",
+    "brake brakes braked": "damping",
     relief: "inertia_relief",
     "ease eased eases": "blend, inverse_mass or ramp",
     "handed lag lags take_over takes_over go_on goes_on": "transfer",

@@ -137,8 +137,8 @@ static bool open_soft(solid_scene *s, const char *model, double young_Pa)
     return solid_scene_open(s);
 }
 
-/* patches begin soft and, as its weight goes on pulling, grow firm; it was let out by 7.3 S. While it swings sub-steps
- * are 0.6 times as long as they need be, no more once it stands still, turned over as before */
+/* regions begin soft, and if they stayed so the weight would draw them out by 7.3 S. While the body swings sub-steps
+ * are half as long as the stiffness asks for, no more once it stands still, with elements inverted as before */
 static void what_falls_over_its_foot_hangs_there(void)
 {
     solid_scene s;
@@ -146,11 +146,11 @@ static void what_falls_over_its_foot_hangs_there(void)
     REQUIRE(open_soft(&s, "monster", 5000));
     int n_swing = 0;
     uint64_t n_look = 0;
-    for (int i = 0; i < 170; i++) {
+    for (int i = 0; i < 220; i++) {
         REQUIRE(solid_scene_step(&s, 1, solid_step_s));
         far = fmax(far, farthest(s.body));
         if (i == 99) n_swing = pal_world_substeps(s.world);
-        if (i == 159) n_look = s.body->safeguards.n_inversion;
+        if (i == 209) n_look = s.body->safeguards.n_inversion;
     }
     const int n_still = pal_world_substeps(s.world);
     printf("  %.2f S from rest at most, %d looks found patches, %d sub-steps, %d still\n", far / s.body->length_scale_m,
@@ -161,23 +161,25 @@ static void what_falls_over_its_foot_hangs_there(void)
     solid_scene_close(&s);
 }
 
-/* growing firm puts work into what is drawn out: unless it is braked, that throws the chair about for 5 s; after 1 s it
- * had 0.21 J more than it began with, 0.12 J of it motion */
-static void what_grows_firm_is_not_thrown_about(void)
+/* A region grows stiff only as what the body has dissipated pays for it: the energy with that of weight never exceeds
+ * what it began with. If stiffening were free it would throw the chair about for 5 s; after 1 s it would have 0.21 J
+ * more than it began with, 0.12 J of it motion. Here its fall is over after 2 s */
+static void what_grows_stiff_is_not_thrown_about(void)
 {
     solid_scene s;
-    double far = 0;
+    double far = 0, high_J = -INFINITY;
     REQUIRE(open_soft(&s, "chair", 10000));
     const double before_J = pal_world_energy_J(s.world);
-    for (int i = 0; i < 60; i++) {
+    for (int i = 0; i < 120; i++) {
         REQUIRE(solid_scene_step(&s, 1, solid_step_s));
         far = fmax(far, farthest(s.body));
+        high_J = fmax(high_J, pal_world_energy_J(s.world) - before_J);
     }
-    const double after_J = pal_world_energy_J(s.world), kinetic_J = pal_body_kinetic_J(s.body);
-    printf("  %.2f S from rest at most, after 1 s %.3g J, %.3g J of motion\n", far / s.body->length_scale_m,
-           after_J - before_J, kinetic_J);
+    const double kinetic_J = pal_body_kinetic_J(s.body);
+    printf("  %.2f S from rest at most, %.3g J at most, after 2 s %.3g J of motion\n", far / s.body->length_scale_m,
+           high_J, kinetic_J);
     CHECK(!s.body->frozen && s.body->safeguards.n_inversion > 0);
-    CHECK_LE(after_J, before_J);
+    CHECK_LE(high_J, 0);
     CHECK_LE(kinetic_J, 0.02);
     CHECK_LE(far, 2.2 * s.body->length_scale_m);
     solid_scene_close(&s);
@@ -188,7 +190,7 @@ int main(void)
     RUN(a_chair_comes_back_from_any_shape);
     RUN_LONG(a_pulled_tail_is_not_let_out_by_what_untangles_it);
     RUN_LONG(what_falls_over_its_foot_hangs_there);
-    RUN_LONG(what_grows_firm_is_not_thrown_about);
+    RUN_LONG(what_grows_stiff_is_not_thrown_about);
     RUN(a_chair_that_is_bent_has_no_patches);
     return check_report();
 }

@@ -134,7 +134,6 @@ typedef struct pal_body {
     const pal_compliance *compliance; /* NULL: none                                                                   */
     double dt_limit_s; /* largest stable sub-step; infinite when unconditional                                  */
     double load_cap_N; /* largest load on a node (pal_body_load_cap_N); larger ones are shortened               */
-    double stiffening_damping_1_s, stiffening_damping_s; /* extra drag and its remaining time (stiffening_damper.h)   */
 
     /* ---- motion near rest ---- */
     double lowest_1_s;   /* lowest angular frequency of the supported body at rest, 1/s; 0: not known              */

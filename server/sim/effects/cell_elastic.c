@@ -6,15 +6,11 @@
  * gives 1/2 d^' K d^).
  *
  * Acts on nodes. Moduli are those of solid->samples; when these change, the constants are recomputed before their next
- * use. Inverted elements use the edges of their cells (cell_recovery.c). Because nodes are not dofs there is no bound
+ * use. Inverted elements recover (recovery/recovery.h). Because nodes are not dofs there is no bound
  * of stiffness (solvers find it by differences of forces), and the tangent is given by products only. */
-#include "server/base/clock.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/elements/elastic_law.h"
-#include "server/sim/recovery/stiffening_damper.h"
 #include "server/sim/subdivision/cell_kernel.h"
-
-#include <math.h>
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
@@ -37,27 +33,30 @@ static pal_err run(void *self, pal_step *step)
 {
     pal_cells_elastic *cells = self;
     pal_body *body = step->body;
-    const bool has_inversion = cells->recovery.n_region > 0;
     pal_cells_elastic_refresh(cells);
-    body->safeguards.n_inversion += cells->recovery.n_inversion, body->safeguards.n_split += cells->recovery.n_change;
-    cells->recovery.n_inversion = cells->recovery.n_change = 0;
-    const uint64_t before = has_inversion ? pal_clock_ns() : 0;
+    pal_recovery_select(cells->recovery, body);
     if (pal_force_cache_matches(&cells->force_cache, body->d))
         pal_force_cache_add(&cells->force_cache, body->f);
     else
         pal_cells_elastic_force(cells, body->d, body->f);
-    if (has_inversion) body->safeguards.ns += pal_clock_ns() - before;
+    pal_recovery_add_forces(cells->recovery, body);
     return PAL_ERR_OK;
+}
+
+static double elements_energy(pal_cells_elastic *cells, const pal_body *body)
+{
+    if (pal_force_cache_matches(&cells->force_cache, body->d)) return cells->force_cache.energy_J;
+    return pal_force_cache_commit(
+        &cells->force_cache,
+        pal_cells_elastic_energy(cells, body->d, pal_force_cache_begin(&cells->force_cache, body->d)));
 }
 
 static double energy(void *self, const pal_body *body)
 {
     pal_cells_elastic *cells = self;
     pal_cells_elastic_refresh(cells);
-    if (pal_force_cache_matches(&cells->force_cache, body->d)) return cells->force_cache.energy_J;
-    return pal_force_cache_commit(
-        &cells->force_cache,
-        pal_cells_elastic_energy(cells, body->d, pal_force_cache_begin(&cells->force_cache, body->d)));
+    pal_recovery_select(cells->recovery, body);
+    return elements_energy(cells, body) + pal_recovery_energy(cells->recovery, body->d, NULL);
 }
 
 static void reset(void *self, const pal_body *body)
@@ -75,45 +74,39 @@ static bool couple(void *self, pal_cliques *out)
     return cells->volume.n > 0;
 }
 
-/* true: lasting loads or a component with external energy, such as weight, act on the body */
-static bool is_loaded(const pal_step *step)
-{
-    const pal_body *body = step->body;
-    double sum = 0;
-    for (int i = 0; i < 3 * body->n_node && body->external_force; i++) sum += fabs(body->external_force[i]);
-    for (int i = 0; i < step->n_force; i++) sum += step->force[i].effect->energy && !step->force[i].effect->internal;
-    return sum > 0;
-}
-
 static unsigned recover(void *self, pal_step *step)
 {
     pal_cells_elastic *cells = self;
     pal_cells_elastic_refresh(cells);
-    const bool changed = pal_cell_recovery_update(&cells->recovery, cells, step->body, step->time_s, is_loaded(step));
-    if (changed) pal_force_cache_invalidate(&cells->force_cache);
-    if (cells->recovery.stiffened_J > 0) pal_stiffening_damper_hold(step->body, cells->recovery.stiffened_J);
-    const unsigned now = cells->recovery.at_rest ? PAL_INVERTED | PAL_INVERSION_AT_REST : PAL_INVERTED;
-    return (cells->recovery.n_region > 0 ? now : 0) | (changed ? PAL_INVERSION_CHANGED : 0);
+    return pal_recovery_update(cells->recovery, step);
 }
 
-/* at rest, for which solvers ask between steps, there are no inverted regions */
+static pal_recovery *recovery(void *self)
+{
+    return ((pal_cells_elastic *)self)->recovery;
+}
+
 static void linearise(void *self, const pal_body *body)
 {
     pal_cells_elastic *cells = self;
     pal_cells_elastic_refresh(cells);
-    cells->recovery.off = body->d == body->node_rest;
+    pal_recovery_select(cells->recovery, body);
     pal_cells_elastic_linearise(cells, body->d);
 }
 
 static void multiply(void *self, const pal_body *body, double k, const double *p, double *out)
 {
     (void)body;
-    pal_cells_elastic_multiply(self, k, p, out);
+    const pal_cells_elastic *cells = self;
+    pal_cells_elastic_multiply(cells, k, p, out);
+    pal_recovery_multiply(cells->recovery, k, p, out);
 }
 
 static void rotate(void *self, double *rotation)
 {
-    pal_cells_elastic_rotate(self, rotation);
+    const pal_cells_elastic *cells = self;
+    pal_cells_elastic_rotate(cells, rotation);
+    pal_recovery_rotate(cells->recovery, rotation);
 }
 
 static double von_mises(const pal_cell_points *points, int p)
@@ -149,6 +142,6 @@ const pal_effect pal_effect_cell_elastic = {PAL_EFFECT("cell_elastic", FORCE),
                                             .internal = true,
                                             .energy = energy,
                                             .reset = reset,
-                                            .recovery.recover = recover,
+                                            .recovery = {.recover = recover, .state = recovery},
                                             .tangent = &tangent,
                                             .inspect = {.measure = measure, .fields = PAL_ELASTIC_FIELDS}};

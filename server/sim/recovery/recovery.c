@@ -62,13 +62,14 @@ pal_err pal_recovery_make(const pal_recovery_model *model, int n_node, const dou
     r->edge_region = PAL_NEW(arena, int32_t, r->n_edge);
     r->region = PAL_NEW(arena, int32_t, n);
     r->on = PAL_NEW(arena, uint8_t, n);
+    r->enters = PAL_NEW(arena, uint8_t, model->n_group + 1);
     r->low = PAL_NEW(arena, float, n);
     r->high = PAL_NEW(arena, float, n);
     r->middle = PAL_NEW(arena, float, n);
     r->root = PAL_NEW(arena, int32_t, n_node);
     if (!PAL_NEW_DOUBLES(arena, 3 * (size_t)n_node, &r->d_m, &r->load_N)) return PAL_ERR_MEMORY;
-    if (!r->k_N_m || !r->active || !r->edge_region || !r->region || !r->on || !r->low || !r->high || !r->middle ||
-        !r->root)
+    if (!r->k_N_m || !r->active || !r->edge_region || !r->region || !r->on || !r->enters || !r->low || !r->high ||
+        !r->middle || !r->root)
         return PAL_ERR_MEMORY;
     for (size_t e = 0; e < n; e++) r->region[e] = NONE, r->on[e] = 1;
     *out = r;
@@ -326,6 +327,15 @@ static bool is_pressed(const pal_body *body)
     return any;
 }
 
+/* weight draws a soft region out, by 1 / s, and that keeps it bad: it may grow again when it is stiff */
+static bool is_drawn_out(const pal_recovery *r, const pal_step *step)
+{
+    bool soft = false, weighs = false;
+    for (int p = 0; p < r->n_region; p++) soft |= r->of[p].scale < 1;
+    for (int i = 0; i < step->n_force; i++) weighs |= step->force[i].effect->energy && !step->force[i].effect->internal;
+    return soft && weighs;
+}
+
 /* which regions are bad */
 static void examine(pal_recovery *r, double passed_s)
 {
@@ -387,6 +397,16 @@ static bool grow(pal_recovery *r, const bool *grows)
     return any;
 }
 
+static void enter_groups(pal_recovery *r)
+{
+    const pal_recovery_model *m = &r->model;
+    memset(r->enters, 0, (size_t)m->n_group);
+    for (int e = 0; e < m->n_element && m->n_group > 0; e++)
+        if (r->region[e] == NEW_REGION) r->enters[m->group(m->self, e)] = 1;
+    for (int e = 0; e < m->n_element && m->n_group > 0; e++)
+        if (r->region[e] == NONE && r->enters[m->group(m->self, e)]) r->region[e] = NEW_REGION;
+}
+
 /* Crushed elements enter, and when no load acts also the others that have been inverted for PAL_RECOVERY_WAIT_S, and
  * the neighbours of regions that do not recover; true: any */
 static bool enter(pal_recovery *r, bool pressed)
@@ -402,6 +422,7 @@ static bool enter(pal_recovery *r, bool pressed)
     for (int e = 0; e < r->model.n_element; e++)
         if (r->region[e] == NONE && (is_crushed(r, e) || (lasts && is_bad(r, e))))
             r->region[e] = NEW_REGION, any = true;
+    if (any) enter_groups(r);
     return any;
 }
 
@@ -437,15 +458,24 @@ static void number(pal_recovery *r)
     }
 }
 
+static bool is_held(const pal_body *body, int node)
+{
+    const pal_interpolation *rows = body->interpolation;
+    bool all = true;
+    if (!rows) return body->support[node];
+    for (int32_t k = rows->start[node]; k < rows->start[node + 1]; k++) all &= body->support[rows->point[k]] != 0;
+    return all;
+}
+
 /* which regions take the rotation of the supports */
 static void fix(pal_recovery *r, const pal_body *body, bool changed)
 {
     double rotation[9];
     const bool known = pal_support_rotation(body, rotation);
     for (int p = 0; p < r->n_region && changed; p++) r->of[p].fixed = 2 * r->of[p].n > r->model.n_element;
-    for (int n = 0; n < r->n_active && changed && !body->interpolation; n++)
+    for (int n = 0; n < r->n_active && changed; n++)
         for (int b = 0; b < 2; b++)
-            if (body->support[ends(r, r->active[n])[b]]) r->of[r->edge_region[r->active[n]]].fixed = true;
+            if (is_held(body, ends(r, r->active[n])[b])) r->of[r->edge_region[r->active[n]]].fixed = true;
     for (int p = 0; p < r->n_region; p++) {
         r->of[p].fixed &= known;
         if (r->of[p].fixed) memcpy(r->of[p].rotation, rotation, sizeof rotation);
@@ -552,9 +582,10 @@ static bool leave(pal_recovery *r, const pal_body *body, double elements_J)
         r->model.act(r->model.self, r->on);
         const double all_J = r->model.energy(r->model.self, body), rise = all_J - elements_J - region->energy_J;
         const double stored_J = rise + region->energy_J,
-                     strain2 = PAL_RECOVERY_LEAVE_STRAIN * PAL_RECOVERY_LEAVE_STRAIN;
+                     share = r->model.no_gradient ? PAL_REST_SHARE
+                                                  : PAL_RECOVERY_LEAVE_STRAIN * PAL_RECOVERY_LEAVE_STRAIN / 6;
         const bool settled = isinf(r->tank_J) || region->good_s >= PAL_RECOVERY_WHOLE_S;
-        if (rise > r->tank_J || (!settled && stored_J > strain2 / 6 * region->size_J)) continue;
+        if (rise > r->tank_J || (!settled && stored_J > share * region->size_J)) continue;
         for (int e = 0; e < r->model.n_element; e++)
             if (r->region[e] == p) r->region[e] = NONE;
         elements_J = all_J;
@@ -617,7 +648,7 @@ static bool update(pal_recovery *r, pal_step *step, double passed_s)
         changed = leave(r, body, before_J);
         if (!changed) apply_regions(r);
     }
-    const bool entered = enter(r, is_pressed(body));
+    const bool entered = enter(r, is_pressed(body) || is_drawn_out(r, step));
     if (entered && !good) before_J = r->model.energy(r->model.self, body);
     changed |= entered;
     if (changed) begin(r, body, before_J + regions_J(r));
@@ -658,5 +689,6 @@ unsigned pal_recovery_update(pal_recovery *r, pal_step *step)
     body->safeguards.n_split += acted != (r->n_region > 0);
     body->safeguards.n_inversion++;
     body->safeguards.ns += pal_clock_ns() - began;
-    return PAL_INVERTED | (changed ? PAL_INVERSION_CHANGED : 0);
+    const bool at_rest = acted && pal_body_kinetic_J(body) < PAL_REST_SHARE * regions_J(r);
+    return PAL_INVERTED | (changed ? PAL_INVERSION_CHANGED : 0) | (at_rest ? PAL_INVERSION_AT_REST : 0);
 }

@@ -1,4 +1,4 @@
-/* Recovery from element inversion of hexahedra, tetrahedra and springs (control cells: inverted_regions.h).
+/* Recovery from element inversion of hexahedra, tetrahedra, springs and control cells.
  *
  * Elements have states of balance that are not the body's shape at rest: folded, mirrored, crumpled. Every element
  * keeps its own force while it can: with the nearest proper rotation it is the gradient of an energy that is finite for
@@ -16,8 +16,9 @@
  * the ratio at its middle too is outside PAL_RECOVERED_LOW to _HIGH, since its energy has no derivative near a flat
  * middle; else after PAL_RECOVERY_WAIT_S (simulated, as all clocks) without a load on the body. A region that stays bad
  * without a load grows by its neighbours every PAL_RECOVERY_GROW_S, and after PAL_RECOVERY_WHOLE_S it is the whole
- * connected body. It becomes elements again when all its ratios are within PAL_RECOVERED_LOW to _HIGH, it would store
- * little (PAL_RECOVERY_LEAVE_STRAIN; not asked for any longer after PAL_RECOVERY_WHOLE_S) and the tank can pay.
+ * connected body; but under weight only while no region is soft (s < 1), since weight draws a soft one out. It becomes
+ * elements again when all its ratios are within PAL_RECOVERED_LOW to _HIGH, it would store little
+ * (PAL_RECOVERY_LEAVE_STRAIN; not asked for any longer after PAL_RECOVERY_WHOLE_S) and the tank can pay.
  *
  * Energy book. A tank T >= 0, empty when the first region is formed, receives what the body dissipates (its energy
  * less the work of lasting loads; nothing while contact acts) and pays for every change at fixed x: of s, of the
@@ -53,6 +54,11 @@ typedef struct pal_recovery_model {
     void (*act)(void *self, const uint8_t *on);
     /* energy of the acting elements, J */
     double (*energy)(void *self, const pal_body *body);
+    /* forces are no gradient of `energy` and may add to it: regions become elements when these store next to nothing */
+    bool no_gradient;
+    /* the group of e, below n_group: elements of a group enter a region together; n_group 0: there are none */
+    int n_group;
+    int (*group)(const void *self, int e);
 } pal_recovery_model;
 
 enum { PAL_RECOVERY_EDGES_MAX = 24, PAL_RECOVERY_REGIONS_MAX = 64 };
@@ -84,6 +90,7 @@ typedef struct pal_recovery {
     int32_t *edge_region;
     int32_t *region;            /* of each element, -1: none                                  [n_element]    */
     uint8_t *on;                /* element acts                                               [n_element]    */
+    uint8_t *enters;            /* an element of the group enters a region                    [n_group]      */
     float *low, *high, *middle; /* ratios at the last examination                     [n_element]    */
     int32_t *root;              /* working memory                                             [n_node]       */
     pal_recovery_region of[PAL_RECOVERY_REGIONS_MAX]; /* further regions share the last one's rotation   */

@@ -28,26 +28,8 @@
  * (tests/stability/test_fem_cases.c) */
 #define PAL_RECOVERY_LEAVE_STRAIN 0.2
 
-/* ---- regions (inverted_regions.h; tests/sim/subdivision/test_cell_recovery.c) ---- */
-
-/* largest energy of elements that return, as a part of the sum of their moduli times volume: with more they would fly
- * apart */
-#define PAL_REGION_LEAVE_SHARE 0.02
-/* s. Time at rest after which a region is released; period of growth of one that does not recover */
-#define PAL_REGION_LEAVE_S (4 * PAL_REGION_GROW_S)
-#define PAL_REGION_GROW_S  0.5
-/* next to nothing: of the energy that is stored, the motion of a body at rest or what a return may add; of
- * load_cap_N, a load that holds nothing inverted
+/* next to nothing: of load_cap_N, a load that holds nothing inverted; of the energy of regions, the motion of a body at
+ * rest; of the energy at rest, what an element stores whose forces have no energy
  * (tests/sim/elements/test_hex_recovery.c) */
 #define PAL_REST_SHARE 1e-3
-
-/* ---- stiffening damper (tests/sim/recovery/test_stiffening_damper.c) ---- */
-
-/* it begins when the energy rises by more than this factor and would move the body by more than its length scale in a
- * second */
-#define PAL_STIFFENING_RISE 10
-/* 1/w. It lasts until exp(-8) of the motion is left */
-#define PAL_STIFFENING_PERIODS 8
-/* s, after the last increase of the energy */
-#define PAL_STIFFENING_HOLD_S 0.1
 #endif

@@ -9,12 +9,12 @@
  * start and after the body was placed elsewhere, v is the velocity at p and dt- = 0, which is the start p- = p - dt
  * v + dt^2 a / 2.
  *
- * D~ is the components' drag (hook `drag`) and the body's stiffening damper (stiffening_damper.h) times M~, plus the
- * samples' damping matrix where their gamma/mu varies. Departure: theta is at least 1 - 1/(k gamma/mu), so that drag
- * that would reverse the motion within a sub-step gives creep instead. Conjugate gradients start with v+ = v, that
- * is p+ = p + (p - p-), and end when |r| <= tolerance |k (f~ - D~ v)| (key, 1e-4). This takes one iteration with the
- * default preconditioner, a Cholesky factor of M~ (num/envelope.h), and 40 to 100 with key preconditioner
- * "diagonal", the paper's. The paper's 2 to 4 iterations leave 1e-4 of the whole right side of eq. 20.
+ * D~ is the components' drag (hook `drag`) times M~, plus the samples' damping matrix where their gamma/mu varies.
+ * Departure: theta is at least 1 - 1/(k gamma/mu), so that drag that would reverse the motion within a sub-step gives
+ * creep instead. Conjugate gradients start with v+ = v, that is p+ = p + (p - p-), and end when |r| <= tolerance |k
+ * (f~ - D~ v)| (key, 1e-4). This takes one iteration with the default preconditioner, a Cholesky factor of M~
+ * (num/envelope.h), and 40 to 100 with key preconditioner "diagonal", the paper's. The paper's 2 to 4 iterations
+ * leave 1e-4 of the whole right side of eq. 20.
  *
  * The sub-step is `safety` (key, 0.9) of 2 / omega_max of (M~, K~), by Lanczos iteration with K~ from differences of
  * forces at the present state (num/lanczos.h). It is computed at load, after edits, and again from the last Ritz
@@ -336,8 +336,7 @@ static void subtract_product(central *solver, double a, double b, double s, doub
 static void find_change(central *solver, const pal_step *step)
 {
     const pal_body *body = step->body;
-    const double dt = step->dt_s, k = 0.5 * (dt + solver->dt_s),
-                 rate = body->stiffening_damping_1_s + pal_guard_drag_1_s(step->force, step->n_force),
+    const double dt = step->dt_s, k = 0.5 * (dt + solver->dt_s), rate = pal_guard_drag_1_s(step->force, step->n_force),
                  over = solver->limit_s > 0 ? dt / solver->limit_s : 0;
     const double scale = step->adds_mass && over > 1 ? over * over : 1;
     const bool varies = solver->mass->damping_kg_s != NULL, moves = begin_change(solver, body);

@@ -1,14 +1,13 @@
 /* Solver verlet: v += dt f/m, x += dt v (the velocity form of paper B section 4.1).
  *
  * Departures. Drag is implicit: v <- (v + dt f/m) / (1 + dt rate), where the rate is the sum of the components' drag
- * rates and of the stiffening damper (stiffening_damper.h); it is stable for every rate. The sub-step is `safety`
- * (key, 0.5) of the stability limit by Gershgorin's bound: with K and C the row sums of stiffness and explicit
- * damping, dt = safety * 2 t where t is the largest with t^2 K + t C <= m at every free node. The bound is
- * recomputed when a node may have moved a fifth of an element. Prescribed nodes keep their velocity. step_guard.h
- * limits displacements. Where the budget of sub-steps is exhausted (step->adds_mass), mass is added to the nodes that
- * break the inequality. Changes of added mass would add energy, so such a node loses up to a hundredth of its
- * velocity per sub-step. Components check for inverted elements whenever the bound is computed, and in every step
- * while there are any. */
+ * rates; it is stable for every rate. The sub-step is `safety` (key, 0.5) of the stability limit by Gershgorin's
+ * bound: with K and C the row sums of stiffness and explicit damping, dt = safety * 2 t where t is the largest with
+ * t^2 K + t C <= m at every free node. The bound is recomputed when a node may have moved a fifth of an element.
+ * Prescribed nodes keep their velocity. step_guard.h limits displacements. Where the budget of sub-steps is exhausted
+ * (step->adds_mass), mass is added to the nodes that break the inequality. Changes of added mass would add energy, so
+ * such a node loses up to a hundredth of its velocity per sub-step. Components check for inverted elements whenever
+ * the bound is computed, and in every step while there are any. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
@@ -72,9 +71,8 @@ static pal_err run(void *self, pal_step *step)
 {
     verlet *solver = self;
     pal_body *body = step->body;
-    double dt = step->dt_s,
-           keep = 1 / (1 + dt * (pal_guard_drag_1_s(step->force, step->n_force) + body->stiffening_damping_1_s)),
-           max2 = 0, non_finite = 0;
+    double dt = step->dt_s, keep = 1 / (1 + dt * pal_guard_drag_1_s(step->force, step->n_force)), max2 = 0,
+           non_finite = 0;
     double root = dt / (2 * solver->safety);
     step->drag_separate = true;
     PAL_TRY(pal_assemble_forces(step));

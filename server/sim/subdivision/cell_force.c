@@ -96,8 +96,7 @@ PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_
     if (apart && what & ENERGY) energy = 0.5 * push * swelling(swell, n_node, u);
     cell_stiffness(&c->line, group, block, lane, n_node, u, what & ENERGY ? &energy : NULL);
     if (apart) add_swelling(swell, n_node, push, u);
-    if (what & ENERGY) pal_wide_store(group->energy_J + block * PAL_LANES + lane, energy);
-    if (c->recovery.n_recovering > 0) {
+    if (c->n_off > 0) {
         const pal_wide here = pal_wide_load(group->here + block * PAL_LANES + lane);
         energy *= here;
         for (int m = 0; m < n_node; m++) u[0][m] *= here, u[1][m] *= here, u[2][m] *= here;
@@ -140,16 +139,13 @@ static void swell_all(pal_cells_elastic *c, const double *d)
 void pal_cells_elastic_force(pal_cells_elastic *c, const double *d, double *f)
 {
     swell_all(c, d);
-    if (c->recovery.n_recovering > 0) (void)pal_cell_recovery_force(&c->recovery, c->solid, d, f);
     all_kinds(c, FORCE, d, f);
 }
 
 double pal_cells_elastic_energy(pal_cells_elastic *c, const double *d, double *f)
 {
-    const bool forces = f && c->op == PAL_CELL_POLAR, regions = c->recovery.n_recovering > 0 && !c->recovery.weighs;
     swell_all(c, d);
-    double sum = regions ? pal_cell_recovery_force(&c->recovery, c->solid, d, f) : 0;
-    return sum + (forces ? all_kinds(c, FORCE | ENERGY, d, f) : all_kinds(c, ENERGY, d, NULL));
+    return f && c->op == PAL_CELL_POLAR ? all_kinds(c, FORCE | ENERGY, d, f) : all_kinds(c, ENERGY, d, NULL);
 }
 
 void pal_cells_elastic_linearise(pal_cells_elastic *c, const double *d)
@@ -170,7 +166,7 @@ PAL_INLINE void move_blocks(const pal_cells_elastic *c, pal_cell_kind kind, int 
                           *home = group->home + b * PAL_LANES + l;
             const double *swell = swell_at(group, n_node, b, l);
             pal_wide u[3][PAL_CELL_MAX_NODES], r[9];
-            if (n_live == 0 || (!c->recovery.off && cell_recovering(c, group, b, l, n_live))) continue;
+            if (n_live == 0 || cell_recovering(c, group, b, l, n_live)) continue;
             cell_gather(node, n_node, p, u);
             pal_wide_load_n(group->rotation + (size_t)b * 9 * PAL_LANES + l, 9, r);
             cell_rotate(r, true, n_node, u, u);
@@ -180,9 +176,7 @@ PAL_INLINE void move_blocks(const pal_cells_elastic *c, pal_cell_kind kind, int 
             }
             cell_stiffness(&c->line, group, b, l, n_node, u, NULL);
             if (c->volume.n > 0) add_swelling(swell, n_node, give_swelling(c, home), u);
-            const pal_wide by = c->recovery.n_recovering > 0 && !c->recovery.off
-                                    ? k * pal_wide_load(group->here + b * PAL_LANES + l)
-                                    : k + zero;
+            const pal_wide by = c->n_off > 0 ? k * pal_wide_load(group->here + b * PAL_LANES + l) : k + zero;
             for (int i = 0; i < 9; i++) r[i] *= by;
             cell_rotate(r, false, n_node, u, u);
             cell_scatter(node, n_node, n_live, u, out);
@@ -203,7 +197,6 @@ void pal_cells_elastic_multiply(const pal_cells_elastic *c, double k, const doub
         find_push(c);
     }
     move_kinds(c, false, k, p, out);
-    if (c->recovery.n_recovering > 0 && !c->recovery.off) pal_cell_recovery_multiply(&c->recovery, k, p, out);
 }
 
 void pal_cells_elastic_displaced(pal_cells_elastic *c, const double *d, pal_cell_kind kind, int element, double *out)
@@ -228,98 +221,10 @@ void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *rotation)
             const int b = e / PAL_LANES, l = e % PAL_LANES;
             const int32_t *node = group->node + (size_t)b * (size_t)group->n_node * PAL_LANES + l;
             for (int i = 0; i < 9; i++) r[i] = group->rotation[((size_t)b * 9 + i) * PAL_LANES + l];
-            const int region = c->recovery.region[c->recovery.first[kind] + e];
-            if (region >= 0 && !c->recovery.off) memcpy(r, c->recovery.of[region].rotation, sizeof r);
             for (int m = 0; m < group->n_node; m++) {
-                double share = n[m] * c->recovery.shear_J[c->recovery.first[kind] + e];
+                const double share = group->here[e] * n[m] * c->k_N_m[c->first[kind] + e];
                 for (int i = 0; i < 9; i++) rotation[9 * (size_t)node[m * PAL_LANES] + i] += share * r[i];
             }
         }
     }
-}
-
-/* ---- inversion ---- */
-
-/* 8 corners of the cells of half a block, in the order of num/shape_functions.h */
-PAL_INLINE void cell_corners(const int32_t *node, int n_node, const double *d, pal_wide (*x)[8])
-{
-    static const int own[8] = {21, 37, 25, 41, 22, 38, 26, 42}, base[8] = {0, 1, 3, 2, 4, 4, 4, 4};
-    for (int k = 0; k < 8; k++) {
-        const int m = n_node == PAL_CUBIC_NODES ? own[k] : n_node == PAL_PYRAMID_NODES ? base[k] : k;
-        for (int l = 0; l < PAL_WIDE; l++) {
-            const double *at = d + 3 * (size_t)node[m * PAL_LANES + l];
-            for (int i = 0; i < 3; i++) ((double *)&x[i][k])[l] = at[i];
-        }
-    }
-}
-
-/* det d(x, y, z)/d(u, v, w) at the 2 x 2 x 2 Gauss points: edges along each direction, mixed in the other two */
-PAL_INLINE void corner_volumes(pal_wide (*x)[8], pal_wide *det)
-{
-    const double near = 0.5 + sqrt(1.0 / 12), far = 1 - near;
-    pal_wide j[3][3][4]; /* direction, component, point in the other two */
-    for (int a = 0; a < 3; a++)
-        for (int i = 0; i < 3; i++) {
-            const int s = 1 << a, b = 1 << (a + 1) % 3, c = 1 << (a + 2) % 3;
-            pal_wide e0 = x[i][s] - x[i][0], e1 = x[i][s | b] - x[i][b], e2 = x[i][s | c] - x[i][c],
-                     e3 = x[i][7] - x[i][b | c];
-            pal_wide f0 = near * e0 + far * e1, f1 = far * e0 + near * e1, f2 = near * e2 + far * e3,
-                     f3 = far * e2 + near * e3;
-            j[a][i][0] = near * f0 + far * f2, j[a][i][1] = near * f1 + far * f3;
-            j[a][i][2] = far * f0 + near * f2, j[a][i][3] = far * f1 + near * f3;
-        }
-    for (int p = 0; p < 8; p++) {
-        const int u = p & 1, v = p >> 1 & 1, w = p >> 2;
-        const int at[3] = {v + 2 * w, w + 2 * u, u + 2 * v};
-        pal_wide a[3], b[3], e[3];
-        for (int i = 0; i < 3; i++) a[i] = j[0][i][at[0]], b[i] = j[1][i][at[1]], e[i] = j[2][i][at[2]];
-        det[p] = a[0] * (b[1] * e[2] - b[2] * e[1]) + a[1] * (b[2] * e[0] - b[0] * e[2]) +
-                 a[2] * (b[0] * e[1] - b[1] * e[0]);
-    }
-}
-
-/* 1 / volumes at rest; 0 at a point that is flat or inverted at rest, which is not examined */
-void pal_cells_corners_make(pal_cells_elastic *c)
-{
-    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
-        const pal_cell_group *g = &c->group[kind];
-        for (int b = 0; b < g->n_block; b++)
-            for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
-                pal_wide x[3][8], det[8], mean = {0};
-                cell_corners(g->node + (size_t)b * (size_t)g->n_node * PAL_LANES + l, g->n_node, c->solid->node_rest,
-                             x);
-                corner_volumes(x, det);
-                for (int p = 0; p < 8; p++) mean += 0.125 * det[p];
-                for (int p = 0; p < 8; p++)
-                    pal_wide_store(g->corner + ((size_t)b * 8 + (size_t)p) * PAL_LANES + l,
-                                   pal_wide_select(det[p] > 0.01 * mean, 1 / det[p], 0 * mean));
-            }
-    }
-}
-
-PAL_INLINE void ratios_of(pal_cells_elastic *c, pal_cell_kind kind, int n_node, const double *d)
-{
-    const pal_cell_group *g = &c->group[kind];
-    double *min = c->recovery.ratio[0] + c->recovery.first[kind], *max = c->recovery.ratio[1] + c->recovery.first[kind];
-    for (int b = 0; b < g->n_block; b++)
-        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
-            const pal_wide one = 1 - (pal_wide){0};
-            const int n_live = cell_live(g, b, l);
-            pal_wide x[3][8], det[8], low = one, high = one;
-            cell_corners(g->node + (size_t)b * (size_t)n_node * PAL_LANES + l, n_node, d, x);
-            corner_volumes(x, det);
-            for (int p = 0; p < 8; p++) {
-                pal_wide inverse = pal_wide_load(g->corner + ((size_t)b * 8 + (size_t)p) * PAL_LANES + l);
-                pal_wide ratio = pal_wide_select(inverse > 0, det[p] * inverse, one);
-                low = pal_wide_select(ratio < low, ratio, low), high = pal_wide_select(ratio > high, ratio, high);
-            }
-            for (int k = 0; k < n_live; k++) min[b * PAL_LANES + l + k] = low[k], max[b * PAL_LANES + l + k] = high[k];
-        }
-}
-
-void pal_cells_elastic_ratios(pal_cells_elastic *c, const double *d)
-{
-    ratios_of(c, PAL_CELL_CUBIC, 64, d);
-    ratios_of(c, PAL_CELL_HEX, 8, d);
-    ratios_of(c, PAL_CELL_PYRAMID, 5, d);
 }

@@ -19,7 +19,7 @@
 #include "server/num/block_matrix.h"
 #include "server/sim/core/body.h"
 #include "server/sim/core/force_cache.h"
-#include "server/sim/recovery/inverted_regions.h"
+#include "server/sim/recovery/recovery.h"
 #include "server/sim/subdivision/subdivision_solid.h"
 
 typedef enum pal_cell_operator {
@@ -49,7 +49,6 @@ typedef struct pal_cell_group {
                                                   [n_block][pairs][9][8] */
     double *corner;      /* 1 / volume at rest at the 8 points where inversion is detected [n_block][8][8] */
     double *here;        /* 1: an element, 0: part of a region                        [n_block][8] */
-    double *energy_J;    /* of each element at the last energy                     [n_block][8] */
     int32_t *home;       /* control cell of each element (pal_cell_volume)            [n_block][8] */
     double *swell;       /* int kappa grad N dV, J/m, kappa of pal_cell_volume   [n_block][n_node][3][8] */
 } pal_cell_group;
@@ -63,32 +62,15 @@ typedef struct pal_cell_volume {
     pal_cliques couple;
 } pal_cell_volume;
 
-typedef struct pal_cell_recovery {
-    int n_cell, n_node, first[PAL_CELL_KINDS]; /* elements of all kinds, and where each kind begins          */
-    double *k_N_m;                             /* of an element's edges                             [n_cell] */
-    double *shear_J;                           /* mu V                                              [n_cell] */
-    double *ratio[2];                          /* least and largest volume over that at rest        [n_cell] */
-    double *element_J;                         /* energy as an element                              [n_cell] */
-    int32_t *region, *before;                  /* of each element, -1: none                         [n_cell] */
-    int32_t *root;                             /* of connected nodes in regions                     [n_node] */
-    pal_inverted_region *of, *old;             /*                                                   [n_cell] */
-    pal_region_edge *edge;                     /* edges of the elements in regions                  [n_edge] */
-    int n_region, n_recovering, n_edge;        /* regions, elements in them                                  */
-    double time_s;      /* simulated time of the last update                                          */
-    double first_J;     /* of motion and elements when regions first appeared: the bound for leaving */
-    double stiffened_J; /* at the last update, of regions whose s has grown                           */
-    bool at_rest; /* the body's motion has next to no energy                                                     */
-    bool off;     /* for one linearisation at rest: all elements act                               */
-    bool weighs;  /* an update needs the energies of elements in regions too                       */
-    uint64_t n_inversion, n_change; /* updates with regions, changes of their elements; not yet reported       */
-} pal_cell_recovery;
-
 typedef struct pal_cells_elastic {
     const pal_subdivision_solid *solid;
     pal_cell_operator op;
     uint64_t sampled;            /* revision of the solid for which constants hold */
     pal_force_cache force_cache; /* made by cell_elastic for PAL_CELL_POLAR under an implicit solver */
-    pal_cell_recovery recovery;
+    pal_recovery *recovery;
+    int n_cell, first[PAL_CELL_KINDS]; /* elements of all kinds, and where each kind begins */
+    int n_off;                         /* of these in regions                               */
+    double *k_N_m;                     /* of the edges of an element in a region   [n_cell] */
     pal_cell_volume volume;
     pal_cell_line line;
     pal_cell_group group[PAL_CELL_KINDS];
@@ -126,11 +108,7 @@ double pal_cells_elastic_energy(pal_cells_elastic *c, const double *d, double *f
 /* evaluates Q at d; out += k sum Q K Q' p: the tangent with constant rotations (of both operators) */
 void pal_cells_elastic_linearise(pal_cells_elastic *c, const double *d);
 void pal_cells_elastic_multiply(const pal_cells_elastic *c, double k, const double *p, double *out);
-/* least and largest volume of every element over that at rest, at the 2 x 2 x 2 Gauss points of its cell, to
- * recovery.ratio; of cubic elements those of the trilinear cell between their own corners' control points */
-void pal_cells_corners_make(pal_cells_elastic *c);
-void pal_cells_elastic_ratios(pal_cells_elastic *c, const double *d);
-/* rotation [n][9] += Q by the elements' stiffness, mu V, at their nodes */
+/* rotation [n][9] += Q by the elements' stiffness at their nodes */
 void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *rotation);
 
 /* d^ of one element in its own axes, as the operator of c has it [n_node][3] */
@@ -154,26 +132,13 @@ typedef double pal_cell_value(const pal_cell_points *points, int p);
 void pal_cells_elastic_measure(const pal_cells_elastic *c, const double *d, pal_cell_value *value, double *sum,
                                double *volume_m3);
 
-/* ---- recovery from inversion (cell_recovery.c, recovery/inverted_regions.h) ----
+/* ---- recovery from inversion (cell_recovery.c) ----
  *
- * Where the volume of an element at one of 8 points falls below PAL_INVERTED_LOW of that at rest, or rises above
- * PAL_INVERTED_HIGH of it, it and its neighbours form a region. An element of volume V with n edges has k = 3 mu V /
- * sum of |X_ij|^2, so that E is the Dirichlet energy of x - G X. Under a lasting load or weight no region grows; s
- * returns to 1 instead, since what hangs by a soft region is drawn out by 1 / s, and the stiffening damper takes away
- * what that adds (stiffened_J). Half blocks with all elements in regions are skipped, except for their energies in an
- * update and to linearise. */
-/* MEMORY */
-pal_err pal_cell_recovery_make(const pal_subdivision_solid *solid, pal_arena *arena, pal_cell_recovery *out);
+ * All of the above is of the elements that act; those in regions of `recovery` do not, and half blocks of nothing but
+ * these are skipped. */
+/* volumes at rest for the ratios; MEMORY */
+void pal_cells_corners_make(pal_cells_elastic *c);
+pal_err pal_cell_recovery_make(pal_cells_elastic *c, pal_arena *arena);
 /* constants for changed samples */
-void pal_cell_recovery_refresh(pal_cell_recovery *t, const pal_cells_elastic *c);
-void pal_cell_recovery_reset(pal_cell_recovery *t, pal_cells_elastic *c);
-/* Examines all elements at the time time_s; loaded: a lasting load pulls at the body. True: the elements in regions, or
- * the s of one, have changed. No heap */
-bool pal_cell_recovery_update(pal_cell_recovery *t, pal_cells_elastic *c, const pal_body *body, double time_s,
-                              bool loaded);
-
-/* of all regions, at nodes d: energy, J; forces are added to f [n_node][3] where it is not NULL */
-double pal_cell_recovery_force(pal_cell_recovery *t, const pal_subdivision_solid *solid, const double *d, double *f);
-/* out += k s sum_ij k_ij (p_i - p_j) */
-void pal_cell_recovery_multiply(const pal_cell_recovery *t, double k, const double *p, double *out);
+void pal_cell_recovery_refresh(pal_cells_elastic *c);
 #endif

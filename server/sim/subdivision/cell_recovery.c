@@ -1,328 +1,231 @@
-/* Regions of inverted elements (cell_kernel.h, "recovery from inversion"). */
-
+/* What recovery (recovery/recovery.h) asks of elements of a subdivision solid. An element's edges are those of its
+ * cell: of a cubic one, between the control points of its own corners. The ratio of volume is that of the cell at its 2
+ * x 2 x 2 Gauss points; that at the middle is det F of the element where its rotation is taken. */
 #include "server/base/vec3.h"
-#include "server/num/union_find.h"
-#include "server/sim/elements/elastic_law.h"
-#include "server/sim/subdivision/cell_kernel.h"
-#include "server/sim/subdivision/tuning.h"
+#include "server/sim/subdivision/cell_simd.h"
 
 #include <math.h>
-#include <string.h>
 
-enum { EDGES_MAX = 12 };
+/* ---- ratios of volume ---- */
 
-/* ---- load ---- */
-
-pal_err pal_cell_recovery_make(const pal_subdivision_solid *solid, pal_arena *arena, pal_cell_recovery *out)
+/* 8 corners of the cells of half a block, in the order of num/shape_functions.h */
+PAL_INLINE void cell_corners(const int32_t *node, int n_node, const double *d, pal_wide (*x)[8])
 {
-    *out = (pal_cell_recovery){.n_node = solid->rows.n_row};
-    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
-        out->first[kind] = out->n_cell, out->n_cell += solid->elements.n[kind];
-    const size_t n = (size_t)out->n_cell;
-    out->k_N_m = PAL_NEW(arena, double, n);
-    out->shear_J = PAL_NEW(arena, double, n);
-    out->ratio[0] = PAL_NEW(arena, double, n);
-    out->ratio[1] = PAL_NEW(arena, double, n);
-    out->element_J = PAL_NEW(arena, double, n);
-    out->region = PAL_NEW(arena, int32_t, n);
-    out->before = PAL_NEW(arena, int32_t, n);
-    out->root = PAL_NEW(arena, int32_t, out->n_node);
-    out->of = PAL_NEW(arena, pal_inverted_region, n);
-    out->old = PAL_NEW(arena, pal_inverted_region, n);
-    out->edge = PAL_NEW(arena, pal_region_edge, EDGES_MAX * n);
-    bool all = out->k_N_m && out->shear_J && out->ratio[0] && out->ratio[1] && out->element_J && out->region &&
-               out->before && out->root && out->of && out->old && out->edge;
-    return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    static const int own[8] = {21, 37, 25, 41, 22, 38, 26, 42}, base[8] = {0, 1, 3, 2, 4, 4, 4, 4};
+    for (int k = 0; k < 8; k++) {
+        const int m = n_node == PAL_CUBIC_NODES ? own[k] : n_node == PAL_PYRAMID_NODES ? base[k] : k;
+        for (int l = 0; l < PAL_WIDE; l++) {
+            const double *at = d + 3 * (size_t)node[m * PAL_LANES + l];
+            for (int i = 0; i < 3; i++) ((double *)&x[i][k])[l] = at[i];
+        }
+    }
 }
 
-static pal_cell_kind kind_of(const pal_cell_recovery *t, int cell, int *element)
+/* det d(x, y, z)/d(u, v, w) at the 2 x 2 x 2 Gauss points: edges along each direction, mixed in the other two */
+PAL_INLINE void corner_volumes(pal_wide (*x)[8], pal_wide *det)
 {
-    pal_cell_kind kind = cell >= t->first[PAL_CELL_PYRAMID] ? PAL_CELL_PYRAMID
-                         : cell >= t->first[PAL_CELL_HEX]   ? PAL_CELL_HEX
+    const double near = 0.5 + sqrt(1.0 / 12), far = 1 - near;
+    pal_wide j[3][3][4]; /* direction, component, point in the other two */
+    for (int a = 0; a < 3; a++)
+        for (int i = 0; i < 3; i++) {
+            const int s = 1 << a, b = 1 << (a + 1) % 3, c = 1 << (a + 2) % 3;
+            pal_wide e0 = x[i][s] - x[i][0], e1 = x[i][s | b] - x[i][b], e2 = x[i][s | c] - x[i][c],
+                     e3 = x[i][7] - x[i][b | c];
+            pal_wide f0 = near * e0 + far * e1, f1 = far * e0 + near * e1, f2 = near * e2 + far * e3,
+                     f3 = far * e2 + near * e3;
+            j[a][i][0] = near * f0 + far * f2, j[a][i][1] = near * f1 + far * f3;
+            j[a][i][2] = far * f0 + near * f2, j[a][i][3] = far * f1 + near * f3;
+        }
+    for (int p = 0; p < 8; p++) {
+        const int u = p & 1, v = p >> 1 & 1, w = p >> 2;
+        const int at[3] = {v + 2 * w, w + 2 * u, u + 2 * v};
+        pal_wide a[3], b[3], e[3];
+        for (int i = 0; i < 3; i++) a[i] = j[0][i][at[0]], b[i] = j[1][i][at[1]], e[i] = j[2][i][at[2]];
+        det[p] = a[0] * (b[1] * e[2] - b[2] * e[1]) + a[1] * (b[2] * e[0] - b[0] * e[2]) +
+                 a[2] * (b[0] * e[1] - b[1] * e[0]);
+    }
+}
+
+/* 1 / volumes at rest; 0 at a point that is flat or inverted at rest, which is not examined */
+void pal_cells_corners_make(pal_cells_elastic *c)
+{
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
+        const pal_cell_group *g = &c->group[kind];
+        for (int b = 0; b < g->n_block; b++)
+            for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
+                pal_wide x[3][8], det[8], mean = {0};
+                cell_corners(g->node + (size_t)b * (size_t)g->n_node * PAL_LANES + l, g->n_node, c->solid->node_rest,
+                             x);
+                corner_volumes(x, det);
+                for (int p = 0; p < 8; p++) mean += 0.125 * det[p];
+                for (int p = 0; p < 8; p++)
+                    pal_wide_store(g->corner + ((size_t)b * 8 + (size_t)p) * PAL_LANES + l,
+                                   pal_wide_select(det[p] > 0.01 * mean, 1 / det[p], 0 * mean));
+            }
+    }
+}
+
+/* det F in the middle of half a block */
+static pal_wide det_of_middle(const pal_cell_group *g, int n_node, int block, int lane, const double *d)
+{
+    pal_wide y[3][PAL_CELL_MAX_NODES], f[9];
+    cell_gather(g->node + (size_t)block * (size_t)n_node * PAL_LANES + lane, n_node, d, y);
+    cell_middle(g, block, lane, y, n_node, f);
+    return pal_wide_det(f);
+}
+
+/* of the elements of a kind: the least and the largest to out, and each to low, high and middle unless they are NULL */
+PAL_INLINE void find_ratios(const pal_cells_elastic *c, pal_cell_kind kind, int n_node, const double *d, double out[2],
+                            float *low, float *high, float *middle)
+{
+    const pal_cell_group *g = &c->group[kind];
+    const pal_wide one = 1 - (pal_wide){0};
+    for (int b = 0; b < g->n_block; b++)
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
+            const int n_live = cell_live(g, b, l);
+            pal_wide x[3][8], det[8], min = one, max = one;
+            if (n_live == 0) continue;
+            cell_corners(g->node + (size_t)b * (size_t)n_node * PAL_LANES + l, n_node, d, x);
+            corner_volumes(x, det);
+            for (int p = 0; p < 8; p++) {
+                pal_wide inverse = pal_wide_load(g->corner + ((size_t)b * 8 + (size_t)p) * PAL_LANES + l);
+                pal_wide ratio = pal_wide_select(inverse > 0, det[p] * inverse, one);
+                min = pal_wide_select(ratio < min, ratio, min), max = pal_wide_select(ratio > max, ratio, max);
+            }
+            for (int k = 0; k < n_live; k++) out[0] = fmin(out[0], min[k]), out[1] = fmax(out[1], max[k]);
+            if (!low) continue;
+            const pal_wide centre = det_of_middle(g, n_node, b, l, d);
+            for (int k = 0; k < n_live; k++) {
+                const int e = c->first[kind] + b * PAL_LANES + l + k;
+                low[e] = (float)min[k], high[e] = (float)max[k], middle[e] = (float)centre[k];
+            }
+        }
+}
+
+static void find_all(const pal_cells_elastic *c, const double *d, double out[2], float *low, float *high, float *middle)
+{
+    out[0] = INFINITY, out[1] = -INFINITY;
+    find_ratios(c, PAL_CELL_CUBIC, 64, d, out, low, high, middle);
+    find_ratios(c, PAL_CELL_HEX, 8, d, out, low, high, middle);
+    find_ratios(c, PAL_CELL_PYRAMID, 5, d, out, low, high, middle);
+}
+
+static void range(void *self, const pal_body *body, double out[2])
+{
+    find_all(self, body->d, out, NULL, NULL, NULL);
+}
+
+static void ratios(void *self, const pal_body *body, float *low, float *high, float *middle)
+{
+    double all[2];
+    find_all(self, body->d, all, low, high, middle);
+}
+
+/* ---- elements and their edges ---- */
+
+static pal_cell_kind kind_of(const pal_cells_elastic *c, int cell, int *element)
+{
+    pal_cell_kind kind = cell >= c->first[PAL_CELL_PYRAMID] ? PAL_CELL_PYRAMID
+                         : cell >= c->first[PAL_CELL_HEX]   ? PAL_CELL_HEX
                                                             : PAL_CELL_CUBIC;
-    *element = cell - t->first[kind];
+    *element = cell - c->first[kind];
     return kind;
 }
 
-/* nodes of the cell itself: 8, or 5 of a pyramid; returns how many */
-static int corners(const pal_cell_recovery *t, const pal_subdivision_solid *solid, int cell, int32_t out[8])
+static int edges(const void *self, int cell, int32_t out[][2])
 {
     static const int own[8] = {21, 22, 25, 26, 37, 38, 41, 42}; /* of the 64 of a cubic element */
-    int e, n = 8;
-    const pal_cell_kind kind = kind_of(t, cell, &e);
-    const int32_t *node = pal_subdivision_solid_nodes(solid, kind, e);
-    if (kind == PAL_CELL_PYRAMID) n = PAL_PYRAMID_NODES;
-    for (int c = 0; c < n; c++) out[c] = node[kind == PAL_CELL_CUBIC ? own[c] : c];
-    return n;
-}
-
-/* both nodes of each edge; returns how many there are */
-static int edges(const pal_cell_recovery *t, const pal_subdivision_solid *solid, int cell, int32_t out[EDGES_MAX][2])
-{
-    int32_t node[8];
-    int n = corners(t, solid, cell, node), k = 0;
+    const pal_cells_elastic *c = self;
+    int e, k = 0;
+    const pal_cell_kind kind = kind_of(c, cell, &e);
+    const int32_t *node = pal_subdivision_solid_nodes(c->solid, kind, e);
+    const int n = kind == PAL_CELL_PYRAMID ? PAL_PYRAMID_NODES : 8;
     for (int a = 0; a < n; a++)
         for (int b = a + 1; b < n; b++) {
             const int apart = a ^ b;
             const bool edge = n == 8 ? apart == 1 || apart == 2 || apart == 4 : b == 4 || b == a + 1 || b == a + 3;
-            if (edge) out[k][0] = node[a], out[k++][1] = node[b];
+            if (!edge) continue;
+            out[k][0] = node[kind == PAL_CELL_CUBIC ? own[a] : a];
+            out[k++][1] = node[kind == PAL_CELL_CUBIC ? own[b] : b];
         }
     return k;
 }
 
-void pal_cell_recovery_refresh(pal_cell_recovery *t, const pal_cells_elastic *c)
+static double stiffness(const void *self, int cell)
+{
+    return ((const pal_cells_elastic *)self)->k_N_m[cell];
+}
+
+void pal_cell_recovery_refresh(pal_cells_elastic *c)
 {
     const pal_subdivision_solid *solid = c->solid;
-    for (int cell = 0; cell < t->n_cell; cell++) {
-        int e, n;
-        int32_t edge[EDGES_MAX][2];
-        const pal_cell_kind kind = kind_of(t, cell, &e);
-        double sum = 0, square = 0;
+    for (int cell = 0; cell < c->n_cell; cell++) {
+        int e;
+        int32_t edge[PAL_RECOVERY_EDGES_MAX][2];
+        const pal_cell_kind kind = kind_of(c, cell, &e);
+        const int n = edges(c, cell, edge);
+        double mu_J = 0, lambda_J = 0, square_m2 = 0;
         for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
+            const double volume_m3 = solid->samples[kind].volume_m3[e * PAL_CELL_GAUSS_POINTS + p];
             double mu, lambda;
             pal_cell_lame(solid, kind, e, p, &mu, &lambda);
-            sum += mu * solid->samples[kind].volume_m3[e * PAL_CELL_GAUSS_POINTS + p];
+            mu_J += mu * volume_m3, lambda_J += lambda * volume_m3;
         }
-        n = edges(t, solid, cell, edge);
-        for (int i = 0; i < n; i++)
-            square +=
-                pow(pal_dist3(solid->node_rest + 3 * (size_t)edge[i][0], solid->node_rest + 3 * (size_t)edge[i][1]), 2);
-        t->k_N_m[cell] = 3 * sum / square;
-        t->shear_J[cell] = sum;
+        for (int i = 0; i < n; i++) {
+            double x[3];
+            pal_sub3(x, solid->node_rest + 3 * (size_t)edge[i][0], solid->node_rest + 3 * (size_t)edge[i][1]);
+            square_m2 += pal_dot3(x, x) / n;
+        }
+        c->k_N_m[cell] = pal_recovery_stiffness_N_m(mu_J, lambda_J, n, square_m2);
     }
+    pal_recovery_refresh(c->recovery);
 }
 
-/* the regions are known: which elements act, and the edges of the others */
-static void show(pal_cell_recovery *t, pal_cells_elastic *c)
+/* ---- elements and regions ---- */
+
+static void act(void *self, const uint8_t *on)
 {
-    t->n_edge = 0;
-    for (int cell = 0; cell < t->n_cell; cell++) {
+    pal_cells_elastic *c = self;
+    c->n_off = 0;
+    for (int cell = 0; cell < c->n_cell; cell++) {
         int e;
-        int32_t edge[EDGES_MAX][2];
-        const int region = t->region[cell];
-        const pal_cell_kind kind = kind_of(t, cell, &e);
-        c->group[kind].here[e] = region < 0;
-        for (int i = region < 0 ? -1 : edges(t, c->solid, cell, edge) - 1; i >= 0; i--)
-            t->edge[t->n_edge++] = (pal_region_edge){{edge[i][0], edge[i][1]}, region, cell};
+        const pal_cell_kind kind = kind_of(c, cell, &e);
+        c->group[kind].here[e] = on[cell], c->n_off += !on[cell];
     }
+    pal_force_cache_invalidate(&c->force_cache);
 }
 
-void pal_cell_recovery_reset(pal_cell_recovery *t, pal_cells_elastic *c)
+static double energy(void *self, const pal_body *body)
 {
-    for (int cell = 0; cell < t->n_cell; cell++) t->region[cell] = -1;
-    t->n_region = t->n_recovering = 0;
-    t->n_inversion = t->n_change = 0;
-    show(t, c);
+    return pal_cells_elastic_energy(self, body->d, NULL);
 }
 
-/* ---- regions ---- */
-
-static double edge_N_m(const void *self, int cell)
+/* elements that share the volume of a control cell; those of operator edges are all one group, since only a body of
+ * nothing but regions has forces with an energy then */
+static int group(const void *self, int cell)
 {
-    return ((const pal_cell_recovery *)self)->k_N_m[cell];
+    const pal_cells_elastic *c = self;
+    int e;
+    const pal_cell_kind kind = kind_of(c, cell, &e);
+    return c->op == PAL_CELL_EDGES ? 0 : c->group[kind].home[e];
 }
 
-double pal_cell_recovery_force(pal_cell_recovery *t, const pal_subdivision_solid *solid, const double *d, double *f)
+pal_err pal_cell_recovery_make(pal_cells_elastic *c, pal_arena *arena)
 {
-    const pal_region_edges in_regions = {t->n_edge, t->edge, edge_N_m, t, solid->node_rest};
-    pal_regions_fit(t->of, t->n_region, &in_regions, d);
-    return pal_regions_energy(t->of, t->n_region, &in_regions, d, NULL, 0, f);
-}
-
-void pal_cell_recovery_multiply(const pal_cell_recovery *t, double k, const double *p, double *out)
-{
-    for (int i = 0; i < t->n_edge; i++) {
-        const pal_region_edge *e = &t->edge[i];
-        const size_t from = 3 * (size_t)e->end[0], to = 3 * (size_t)e->end[1];
-        const double by = k * t->of[e->region].scale * t->k_N_m[e->owner];
-        double x[3];
-        pal_sub3(x, p + to, p + from);
-        pal_axpy3(out + from, -by, x), pal_axpy3(out + to, by, x);
-    }
-}
-
-/* ---- detection ---- */
-
-static bool is_bad(const pal_cell_recovery *t, int cell)
-{
-    return t->ratio[0][cell] < PAL_INVERTED_LOW || t->ratio[1][cell] > PAL_INVERTED_HIGH;
-}
-static bool is_good(const pal_cell_recovery *t, int cell)
-{
-    return t->ratio[0][cell] > PAL_RECOVERED_LOW && t->ratio[1][cell] < PAL_RECOVERED_HIGH;
-}
-
-/* energies of the regions and of their elements at d */
-static void weigh(pal_cell_recovery *t, const pal_cells_elastic *c, const double *d)
-{
-    for (int p = 0; p < t->n_region; p++) {
-        pal_inverted_region *region = &t->of[p];
-        region->region_J = region->element_J = region->size_J = 0, region->bad = false, region->n = 0;
-    }
-    (void)pal_cell_recovery_force(t, c->solid, d, NULL);
-    for (int cell = 0; cell < t->n_cell; cell++) {
-        if (t->region[cell] < 0) continue;
-        pal_inverted_region *region = &t->of[t->region[cell]];
-        region->element_J += t->element_J[cell];
-        region->size_J += t->shear_J[cell];
-        region->bad |= !is_good(t, cell);
-        region->n++;
-    }
-}
-
-/* energy of the body's motion and elements; the energies of regions are known */
-static double whole(const pal_cell_recovery *t, double kinetic_J)
-{
-    double sum = kinetic_J + pal_regions_sum_J(t->of, t->n_region);
-    for (int cell = 0; cell < t->n_cell; cell++)
-        if (t->region[cell] < 0) sum += t->element_J[cell];
-    return sum;
-}
-
-enum { NOT = -1, NEW = -2 };
-
-/* inverted elements enter with their neighbours, and so do the neighbours of regions that do not recover, but not under
- * a lasting load: the load inverts them, and larger regions are softer. True: any */
-static bool enter(pal_cell_recovery *t, const pal_subdivision_solid *solid, bool loaded)
-{
-    bool any = false;
-    memset(t->root, 0, sizeof *t->root * (size_t)t->n_node);
-    for (int p = 0; p < t->n_region; p++) t->of[p].bad = pal_region_grows(&t->of[p], loaded);
-    for (int cell = 0; cell < t->n_cell; cell++) {
-        int32_t node[8];
-        if (t->region[cell] >= 0 ? !t->of[t->region[cell]].bad : !is_bad(t, cell)) continue;
-        for (int k = corners(t, solid, cell, node) - 1; k >= 0; k--) t->root[node[k]] = 1;
-    }
-    for (int cell = 0; cell < t->n_cell; cell++) {
-        int32_t node[8];
-        bool beside = false;
-        if (t->region[cell] >= 0) continue;
-        for (int k = corners(t, solid, cell, node) - 1; k >= 0; k--) beside |= t->root[node[k]];
-        if (beside) t->region[cell] = NEW;
-        any |= beside;
-    }
-    return any;
-}
-
-/* the elements that share the volume of a control cell enter a region together */
-static void enter_whole_cells(pal_cell_recovery *t, const pal_cells_elastic *c)
-{
-    /* sums and pushes are computed before each use */
-    double *mark = c->volume.push;
-    memset(mark, 0, sizeof *mark * (size_t)c->volume.n);
-    for (int pass = 0; pass < 2; pass++)
-        for (int cell = 0; cell < t->n_cell; cell++) {
-            int e;
-            const pal_cell_kind kind = kind_of(t, cell, &e);
-            const int32_t home = c->group[kind].home[e];
-            if (pass == 0 && t->region[cell] != NOT) mark[home] = 1;
-            if (pass == 1 && t->region[cell] == NOT && mark[home] > 0) t->region[cell] = NEW;
-        }
-}
-
-/* numbers the regions of elements connected by nodes */
-static void number(pal_cell_recovery *t, const pal_subdivision_solid *solid)
-{
-    int32_t node[8];
-    pal_union_find_init(t->root, t->n_node);
-    for (int cell = 0; cell < t->n_cell; cell++) {
-        if (t->region[cell] == NOT) continue;
-        for (int k = corners(t, solid, cell, node) - 1; k > 0; k--) pal_union_find_join(t->root, node[0], node[k]);
-    }
-    for (int i = 0; i < t->n_node; i++) t->root[i] = pal_union_find_root(t->root, i);
-    t->n_region = t->n_recovering = 0;
-    /* roots are the least nodes of their regions: -1 - number once they have one */
-    for (int cell = 0; cell < t->n_cell; cell++) {
-        if (t->region[cell] == NOT) continue;
-        corners(t, solid, cell, node);
-        int at = t->root[node[0]] >= 0 ? t->root[node[0]] : node[0];
-        if (t->root[at] >= 0) {
-            t->of[t->n_region] = (pal_inverted_region){.scale = 1};
-            t->root[at] = -1 - t->n_region++;
-        }
-        t->region[cell] = -1 - t->root[at];
-        t->n_recovering++;
-    }
-}
-
-/* chooses G and s of changed regions */
-static void begin(pal_cell_recovery *t, pal_cells_elastic *c, const pal_body *body)
-{
-    for (int cell = 0; cell < t->n_cell; cell++)
-        if (t->region[cell] >= 0) t->of[t->region[cell]].n++;
-    pal_regions_fix(t->of, t->n_region, body, t->n_cell);
-    weigh(t, c, body->d);
-    for (int p = 0; p < t->n_region; p++) t->of[p].element_J = 0;
-    for (int cell = 0; cell < t->n_cell; cell++) {
-        if (t->region[cell] < 0) continue;
-        const int was = t->before[cell];
-        /* an old region's share by its elements' number: only the sum matters, and an old region never parts */
-        t->of[t->region[cell]].element_J += was >= 0 ? t->old[was].region_J / t->old[was].n : t->element_J[cell];
-    }
-    for (int p = 0; p < t->n_region; p++) {
-        pal_inverted_region *region = &t->of[p];
-        if (region->region_J > region->element_J)
-            region->scale = fmax(PAL_FILL_MIN, region->element_J / region->region_J);
-        region->region_J *= region->scale;
-    }
-}
-
-/* tissue under a lasting load would hang by a region that began soft, and be drawn out by 1 / s: s returns to 1. True:
- * one has changed */
-static bool stiffen(pal_cell_recovery *t, double passed_s)
-{
-    bool any = false;
-    for (int p = 0; p < t->n_region; p++) {
-        pal_inverted_region *region = &t->of[p];
-        if (region->scale >= 1 ||
-            floor(region->grow_s / PAL_CELL_STIFFEN_S) <= floor((region->grow_s - passed_s) / PAL_CELL_STIFFEN_S))
-            continue;
-        region->scale = fmin(1, PAL_CELL_STIFFEN_FACTOR * region->scale);
-        t->stiffened_J += PAL_CELL_STIFFEN_FACTOR * region->region_J;
-        any = true;
-    }
-    return any;
-}
-
-bool pal_cell_recovery_update(pal_cell_recovery *t, pal_cells_elastic *c, const pal_body *body, double time_s,
-                              bool loaded)
-{
-    bool bad = t->n_region > 0;
-    const double passed_s = fmax(0, time_s - t->time_s);
-    t->time_s = time_s;
-    t->stiffened_J = 0;
-    pal_cells_elastic_ratios(c, body->d);
-    for (int cell = 0; cell < t->n_cell; cell++) bad |= is_bad(t, cell);
-    if (!bad) return false;
-    t->n_inversion++;
-    t->weighs = true;
-    (void)pal_cells_elastic_energy(c, body->d, NULL);
-    t->weighs = false;
-    for (int cell = 0; cell < t->n_cell; cell++) {
-        int e;
-        const pal_cell_kind kind = kind_of(t, cell, &e);
-        t->element_J[cell] = c->group[kind].energy_J[e];
-    }
-    weigh(t, c, body->d);
-    memcpy(t->old, t->of, sizeof *t->of * (size_t)t->n_region);
-    const bool first = t->n_region == 0;
-    const double kinetic_J = pal_body_kinetic_J(body), rest_J = PAL_REST_SHARE * pal_regions_sum_J(t->of, t->n_region);
-    /* forces of operator edges have no energy, and it adds energy to larger motions */
-    const double max_share = c->op == PAL_CELL_EDGES ? PAL_REST_SHARE : PAL_REGION_LEAVE_SHARE;
-    t->at_rest = kinetic_J < rest_J;
-    for (int p = 0; p < t->n_region; p++) t->of[p].kinetic_J = kinetic_J;
-    bool changed = pal_regions_leave(t->of, t->n_region, first ? 0 : t->first_J - whole(t, kinetic_J), max_share,
-                                     INFINITY, rest_J, passed_s);
-    for (int cell = 0; cell < t->n_cell && changed; cell++)
-        if (t->region[cell] >= 0 && t->of[t->region[cell]].n == 0) t->region[cell] = NOT;
-    memcpy(t->before, t->region, sizeof *t->region * (size_t)t->n_cell);
-    changed |= enter(t, c->solid, loaded);
-    if (changed && c->volume.n > 0) enter_whole_cells(t, c);
-    if (!changed) return loaded && stiffen(t, passed_s);
-    number(t, c->solid);
-    show(t, c);
-    begin(t, c, body);
-    if (first) t->first_J = whole(t, kinetic_J);
-    t->n_change++;
-    return true;
+    const bool edged = c->op == PAL_CELL_EDGES;
+    const pal_recovery_model model = {.self = c,
+                                      .n_element = c->n_cell,
+                                      .edges = edges,
+                                      .stiffness_N_m = stiffness,
+                                      .range = range,
+                                      .ratios = ratios,
+                                      .act = act,
+                                      .energy = energy,
+                                      .no_gradient = edged,
+                                      .n_group = edged ? 1 : c->volume.n,
+                                      .group = group};
+    if (!PAL_NEW_DOUBLES(arena, (size_t)c->n_cell, &c->k_N_m)) return PAL_ERR_MEMORY;
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
+        for (int e = 0; e < c->group[kind].n; e++) c->group[kind].here[e] = 1;
+    return pal_recovery_make(&model, c->solid->rows.n_row, c->solid->node_rest, arena, &c->recovery);
 }

@@ -67,17 +67,24 @@ PAL_INLINE void cell_minus_rest(const double *rest, int n_node, pal_wide (*u)[PA
 
 /* ---- rotation ---- */
 
-/* r = Q and s = Q'F of F in the middle; at: block and lane */
-PAL_INLINE void cell_rotation(pal_cell_group *group, int block, int lane, pal_wide (*y)[PAL_CELL_MAX_NODES], int n_node,
-                              pal_wide r[9], pal_wide s[9])
+/* F in the middle; at: block and lane */
+PAL_INLINE void cell_middle(const pal_cell_group *group, int block, int lane, pal_wide (*y)[PAL_CELL_MAX_NODES],
+                            int n_node, pal_wide f[9])
 {
     const pal_wide zero = {0};
-    pal_wide h[9] = {zero, zero, zero, zero, zero, zero, zero, zero, zero}, frame[9], f[9];
+    pal_wide h[9] = {zero, zero, zero, zero, zero, zero, zero, zero, zero}, frame[9];
     for (int m = 0; m < n_node; m++)
         for (int i = 0; i < 3; i++)
             for (int j = 0; j < 3; j++) h[3 * i + j] += y[i][m] * group->middle[m][j];
     pal_wide_load_n(group->frame + (size_t)block * 9 * PAL_LANES + lane, 9, frame);
     pal_wide_mul(f, h, frame);
+}
+/* r = Q and s = Q'F of it */
+PAL_INLINE void cell_rotation(pal_cell_group *group, int block, int lane, pal_wide (*y)[PAL_CELL_MAX_NODES], int n_node,
+                              pal_wide r[9], pal_wide s[9])
+{
+    pal_wide f[9];
+    cell_middle(group, block, lane, y, n_node, f);
     double *rotation = group->q + (size_t)block * 4 * PAL_LANES + lane;
     pal_wide_take_rotation(rotation, ~(pal_wide_mask){0}, f, r, s);
 }
@@ -249,12 +256,12 @@ PAL_INLINE int cell_live(const pal_cell_group *group, int block, int lane)
     int n = group->n - block * PAL_LANES - lane;
     return n < 0 ? 0 : n < PAL_WIDE ? n : PAL_WIDE;
 }
-/* all of half a block are in regions, and nobody asks for their own energies */
+/* all of half a block are in regions */
 PAL_INLINE bool cell_recovering(const pal_cells_elastic *c, const pal_cell_group *group, int block, int lane,
                                 int n_live)
 {
     double here = 0;
-    if (c->recovery.n_recovering == 0 || c->recovery.weighs) return false;
+    if (c->n_off == 0) return false;
     for (int l = 0; l < n_live; l++) here += group->here[block * PAL_LANES + lane + l];
     return here == 0;
 }

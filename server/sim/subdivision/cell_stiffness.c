@@ -62,10 +62,8 @@ static pal_err allocate(pal_cell_group *g, pal_arena *arena)
     g->volume = PAL_NEW(arena, double, n_lane);
     g->corner = PAL_NEW(arena, double, n_lane * 8);
     g->here = PAL_NEW(arena, double, n_lane);
-    g->energy_J = PAL_NEW(arena, double, n_lane);
     g->middle = (double(*)[3])PAL_NEW(arena, double, 3 * n_node);
-    bool all = g->node && g->rest && g->frame && g->q && g->rotation && g->volume && g->middle && g->corner &&
-               g->here && g->energy_J;
+    bool all = g->node && g->rest && g->frame && g->q && g->rotation && g->volume && g->middle && g->corner && g->here;
     if (g->n_node == PAL_CUBIC_NODES) {
         g->scale = PAL_NEW(arena, float, n_lane *PAL_CELL_GAUSS_POINTS * 9);
         g->stiff = PAL_NEW(arena, float, n_lane *PAL_CELL_GAUSS_POINTS * 2);
@@ -238,13 +236,13 @@ void pal_cells_elastic_refresh(pal_cells_elastic *c)
     fill_stored(c->solid, PAL_CELL_HEX, &c->group[PAL_CELL_HEX], mean, shared);
     fill_stored(c->solid, PAL_CELL_PYRAMID, &c->group[PAL_CELL_PYRAMID], mean, shared);
     pal_cell_volume_refresh(c);
-    pal_cell_recovery_refresh(&c->recovery, c);
+    pal_cell_recovery_refresh(c);
 }
 
 void pal_cells_elastic_reset(pal_cells_elastic *c)
 {
     pal_force_cache_invalidate(&c->force_cache);
-    pal_cell_recovery_reset(&c->recovery, c);
+    pal_recovery_reset(c->recovery);
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
         const pal_cell_group *g = &c->group[kind];
         for (int i = 0; i < 4 * PAL_LANES * g->n_block; i++) g->q[i] = i / PAL_LANES % 4 == 0;
@@ -258,11 +256,13 @@ pal_err pal_cells_elastic_make(const pal_subdivision_solid *solid, pal_cell_oper
     memset(out, 0, sizeof *out);
     out->solid = solid, out->op = op;
     make_line(&out->line);
-    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
         PAL_TRY(make_group(solid, kind, arena, &out->group[kind], diag));
-    PAL_TRY(pal_cell_recovery_make(solid, arena, &out->recovery));
+        out->first[kind] = out->n_cell, out->n_cell += out->group[kind].n;
+    }
     pal_cells_corners_make(out);
     PAL_TRY(pal_cell_volume_make(out, arena));
+    PAL_TRY(pal_cell_recovery_make(out, arena));
     pal_cells_elastic_reset(out);
     pal_cells_elastic_refresh(out);
     return PAL_ERR_OK;

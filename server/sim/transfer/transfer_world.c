@@ -73,7 +73,6 @@ static void transfer_body(pal_world *w, int b, const pal_body *from, const doubl
     to->frozen = from->frozen;
     memcpy(to->reason, from->reason, sizeof to->reason);
     to->safeguards = from->safeguards;
-    to->stiffening_damping_1_s = from->stiffening_damping_1_s, to->stiffening_damping_s = from->stiffening_damping_s;
     pal_world_invalidate_limits(w, b);
 }
 

@@ -5,7 +5,6 @@
 #include "server/base/vec3.h"
 #include "server/sim/core/step_guard.h"
 #include "server/sim/implicit/lowest_frequency.h"
-#include "server/sim/recovery/stiffening_damper.h"
 #include "server/sim/world/world_core.h"
 
 #include <stdlib.h>
@@ -412,7 +411,6 @@ pal_err pal_world_step(pal_world *world, double dt_s)
     pal_tools_end_step(&w->tools, w->n_substep);
     w->tick++;
     w->time_s += dt_s;
-    for (int b = 0; b < w->plan.n_body; b++) pal_stiffening_damper_advance(&w->plan.body[b], dt_s);
     run_stage(w, PAL_STAGE_ADAPT, dt_s);
     run_stage(w, PAL_STAGE_GUARD, dt_s);
     run_stage(w, PAL_STAGE_OUTPUT, dt_s);

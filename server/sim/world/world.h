@@ -43,7 +43,8 @@ void pal_world_reset(pal_world *world);
 /* Resets one body to rest as at load and unfreezes it; its lasting loads and brushes end and tools release it. Other
  * bodies, tools and time are unaffected. REFUSED: no such body. [sim] */
 pal_err pal_world_reset_body(pal_world *world, int body);
-/* edits the material at run time and chooses the sub-steps again; BUDGET or REFUSED: unchanged. [sim] */
+/* Edits the material at run time and chooses the sub-steps again; where the modulus falls to r of it, velocities of a
+ * supported body are scaled by sqrt r. BUDGET or REFUSED: unchanged. [sim] */
 pal_err pal_world_material(pal_world *world, int body, const pal_material *material, pal_diagnostic *diag);
 /* Sets a lasting load on a node, N, body axes. It replaces the node's earlier load and ends at reset. The first load
  * on a body allocates memory. On an adaptive body an inactive node counts as no such node; the load of a node that

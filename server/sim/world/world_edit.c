@@ -1,6 +1,5 @@
 /* Commands to a world between two steps: poses, resets, materials, fields, brushes, components. */
 #include "server/base/clock.h"
-#include "server/sim/recovery/stiffening_damper.h"
 #include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
@@ -34,7 +33,6 @@ static void rest_body(pal_world *w, int b)
     if (body->external_force) memset(body->external_force, 0, n_load);
     pal_body_update_nodes(body);
     body->frozen = body->asleep = false;
-    body->stiffening_damping_1_s = body->stiffening_damping_s = 0;
     body->reason[0] = 0;
     body->safeguards = (pal_safeguards){0};
     for (int i = 0; i < w->plan.n_component; i++) {
@@ -95,20 +93,26 @@ static pal_err apply_material(pal_world *w, int b, const pal_material *given, pa
     return PAL_ERR_OK;
 }
 
+/* What an edit to a stiffer material has put into a deformed body would throw it about once it is soft again. So where
+ * the modulus falls the motion keeps its amplitude, not its speed: with it fall the frequencies. A free body keeps its
+ * momentum */
+static void scale_motion(pal_body *body, double times)
+{
+    bool held = false;
+    for (int i = 0; i < body->n_dof; i++) held |= body->support[i] != 0;
+    for (int i = 0; i < 3 * body->n_dof && held && times < 1; i++)
+        if (!body->support[i / 3]) body->v[i] *= sqrt(times);
+}
+
 pal_err pal_world_material(pal_world *world, int body, const pal_material *material, pal_diagnostic *diag)
 {
     if (body < 0 || body >= world->plan.n_body) return PAL_REFUSE(diag, "body %d does not exist", body);
     pal_material to = *material, was = world->material[body];
     PAL_TRY(pal_material_check(&to, diag));
     world->plan.body[body].asleep = false;
-    /* evaluating the energy may change what components cache: do so only where needed */
-    bool damps =
-        !world->plan.body[body].implicit && !world->plan.body[body].interpolation && to.young_Pa > 10 * was.young_Pa;
-    double before_J = damps ? pal_world_component_energy_J(world, body) : 0;
     pal_err err = apply_material(world, body, &to, diag);
     if (!err) err = pal_world_check_budget(world, diag);
-    if (!err && damps)
-        pal_stiffening_damper_begin(&world->plan.body[body], before_J, pal_world_component_energy_J(world, body));
+    if (!err) scale_motion(&world->plan.body[body], to.young_Pa / was.young_Pa);
     /* constants are functions of the material, so restoring the old one restores everything */
     if (err) (void)apply_material(world, body, &was, NULL);
     pal_world_find_limit(world, 0);

@@ -59,7 +59,7 @@ static void forces_are_the_gradient_and_sum_up_to_nothing(void)
         double *x = calloc(2 * (size_t)n, sizeof *x), *p = x + n;
         cell_rotation(1.2, turn);
         cell_map(&b, turn, 0.3);
-        cell_shake(&b, 0.1 * cbrt(pal_subdivision_solid_volume_m3(b.solid) / b.row->recovery.n_cell), 21);
+        cell_shake(&b, 0.1 * cbrt(pal_subdivision_solid_volume_m3(b.solid) / b.row->n_cell), 21);
         memcpy(x, b.body.d, sizeof *x * (size_t)n);
         for (int k = 0; k < 4; k++) {
             for (int m = 0; m < n; m++) p[m] = 2 * pal_random_unit(11 + (uint64_t)k, (uint64_t)m) - 1;
@@ -143,10 +143,10 @@ static void regions_take_whole_control_cells(void)
     b.body.d[3 * far] -= 2;
     CHECK(cell_effect->recovery.recover(b.row, &(pal_step){.body = &b.body}) & PAL_INVERSION_CHANGED);
     int of[2] = {0, 0}, all[2] = {0, 0};
-    for (int e = 0; e < b.row->recovery.n_cell; e++) {
-        int kind = e >= b.row->recovery.first[PAL_CELL_HEX] ? PAL_CELL_HEX : PAL_CELL_CUBIC;
-        int home = b.row->group[kind].home[e - b.row->recovery.first[kind]];
-        all[home]++, of[home] += b.row->recovery.region[e] >= 0;
+    for (int e = 0; e < b.row->n_cell; e++) {
+        int kind = e >= b.row->first[PAL_CELL_HEX] ? PAL_CELL_HEX : PAL_CELL_CUBIC;
+        int home = b.row->group[kind].home[e - b.row->first[kind]];
+        all[home]++, of[home] += b.row->recovery->region[e] >= 0;
     }
     CHECK_INT(all[0] + all[1], 128);
     for (int h = 0; h < 2; h++) CHECK(of[h] == 0 || of[h] == all[h]);
