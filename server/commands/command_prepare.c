@@ -436,7 +436,7 @@ static const pal_flag flag[] = {
      PAL_DENSITY_MAX_KG_M3, "density (1000)"},
     {"--damping-1-s", "C", PAL_FLAG_NUMBER, &args.scene.material.damping_1_s, 0, PAL_NUMBER_MAX,
      "drag over mass (see --damping-ratio)"},
-    {"--damping-ratio", "Z", PAL_FLAG_NUMBER, &args.scene.material.damping_ratio, 0, PAL_DAMPING_RATIO_MAX,
+    {"--damping-ratio", "Z", PAL_FLAG_NUMBER, &args.scene.material.damping_ratio, 0, PAL_FACTOR_MAX,
      "damping of the slowest mode over the critical one, as long as the rate stays below 4 1/s (1)"},
     {"--up", "AXIS", PAL_FLAG_TEXT, &args.up, 0, 0, "x, y, z, -x, -y or -z: the direction against gravity (z)"},
     {"--hold", "PERCENT", PAL_FLAG_NUMBER, &args.hold_percent, 0.1, 100,

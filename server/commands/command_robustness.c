@@ -100,10 +100,10 @@ static void print_job(const pal_robustness_job *job)
     double max_s = 0;
     if (job->summary[0]) printf("%s\n", job->summary);
     printf("%s: %s\n\n", job->title,
-           report->rests  ? "comes to rest by itself"
-           : report->led  ? "has a prescribed motion without end: compared with an unloaded run"
-           : report->late ? "does not come to rest by itself in the time"
-                          : "does not come to rest by itself");
+           report->rests    ? "comes to rest by itself"
+           : report->driven ? "has a prescribed motion without end: compared with an unloaded run"
+           : report->late   ? "does not come to rest by itself in the time"
+                            : "does not come to rest by itself");
     printf("%-11s %-10s %-4s %-9s %9s %8s %9s %9s %8s %8s %7s  %s\n", "case", "verdict", "safe", "recovered",
            "returns s", "force/cap", "energy +", "excluded", "% S left", "sim s", "cpu s", "what happened");
     for (int k = 0; k < report->n; k++)

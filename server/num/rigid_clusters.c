@@ -1,4 +1,4 @@
-/* Rigid parts as a coarse space. */
+/* Rigid clusters as a coarse space. */
 #include "server/num/rigid_clusters.h"
 
 #include "server/base/vec3.h"
@@ -6,38 +6,39 @@
 #include <string.h>
 
 enum { BOXES_MAX = 1 << 24 };
-/* of a diagonal entry: parts of one point, or of points on a line, have rotations without stiffness */
+/* of a diagonal entry: clusters of one point, or of points on a line, have rotations without stiffness */
 #define SHIFT 1e-9
 
-static pal_err find_parts(pal_rigid_clusters *p, const double *x, const uint8_t *fixed, double part_m, pal_arena *arena)
+static pal_err find_clusters(pal_rigid_clusters *p, const double *x, const uint8_t *fixed, double cluster_m,
+                             pal_arena *arena)
 {
     double low[3], high[3], n_box = 1;
     int count[3];
     pal_box3_empty(low, high);
     for (int i = 0; i < p->n; i++) pal_box3_add(low, high, x + 3 * (size_t)i);
     for (int c = 0; c < 3; c++) {
-        const double along = floor((high[c] - low[c]) / part_m) + 1;
+        const double along = floor((high[c] - low[c]) / cluster_m) + 1;
         if (!((n_box *= along) <= BOXES_MAX)) return PAL_ERR_BUDGET;
         count[c] = (int)along;
     }
     int32_t *box = PAL_NEW(arena, int32_t, n_box), *n_in = PAL_NEW(arena, int32_t, p->n);
     double *middle = PAL_NEW(arena, double, 3 * (size_t)p->n);
-    p->part = PAL_NEW(arena, int32_t, p->n), p->arm = PAL_NEW(arena, double, 3 * (size_t)p->n);
-    if (!box || !n_in || !middle || !p->part || !p->arm) return PAL_ERR_MEMORY;
+    p->cluster = PAL_NEW(arena, int32_t, p->n), p->arm = PAL_NEW(arena, double, 3 * (size_t)p->n);
+    if (!box || !n_in || !middle || !p->cluster || !p->arm) return PAL_ERR_MEMORY;
     for (int i = 0; i < p->n; i++) {
         int at[3];
-        p->part[i] = -1;
+        p->cluster[i] = -1;
         if (fixed[i]) continue;
-        for (int c = 0; c < 3; c++) at[c] = (int)((x[3 * i + c] - low[c]) / part_m);
+        for (int c = 0; c < 3; c++) at[c] = (int)((x[3 * i + c] - low[c]) / cluster_m);
         int32_t *of = &box[(at[2] * count[1] + at[1]) * count[0] + at[0]];
-        if (*of == 0) *of = ++p->n_part;
-        p->part[i] = *of - 1;
-        n_in[p->part[i]]++;
-        pal_add3(middle + 3 * (size_t)p->part[i], middle + 3 * (size_t)p->part[i], x + 3 * (size_t)i);
+        if (*of == 0) *of = ++p->n_cluster;
+        p->cluster[i] = *of - 1;
+        n_in[p->cluster[i]]++;
+        pal_add3(middle + 3 * (size_t)p->cluster[i], middle + 3 * (size_t)p->cluster[i], x + 3 * (size_t)i);
     }
     for (int i = 0; i < p->n; i++)
-        for (int c = 0; c < 3 && p->part[i] >= 0; c++)
-            p->arm[3 * i + c] = (x[3 * i + c] - middle[3 * p->part[i] + c] / n_in[p->part[i]]) / part_m;
+        for (int c = 0; c < 3 && p->cluster[i] >= 0; c++)
+            p->arm[3 * i + c] = (x[3 * i + c] - middle[3 * p->cluster[i] + c] / n_in[p->cluster[i]]) / cluster_m;
     return PAL_ERR_OK;
 }
 
@@ -49,7 +50,7 @@ static void columns_of(const double arm[3], double b[3][6])
     memcpy(b, all, sizeof all);
 }
 
-/* to += block in the rows of part p and the columns of part q, [6][6], of the lower triangle */
+/* to += block in the rows of cluster p and the columns of cluster q, [6][6], of the lower triangle */
 static void add_block(pal_block_matrix *to, int p, int q, double block[6][6])
 {
     for (int a = 0; a < 2; a++)
@@ -68,7 +69,7 @@ static void assemble(const pal_rigid_clusters *p, const pal_block_matrix *a, pal
     for (int j = 0; j < p->n; j++)
         for (int32_t k = a->start[j]; k < a->start[j + 1]; k++) {
             const int i = a->row[k];
-            if (p->part[i] < 0 || p->part[j] < 0) continue;
+            if (p->cluster[i] < 0 || p->cluster[j] < 0) continue;
             double bi[3][6], bj[3][6], half[3][6] = {{0}}, block[6][6] = {{0}}, turned[6][6];
             columns_of(p->arm + 3 * (size_t)i, bi), columns_of(p->arm + 3 * (size_t)j, bj);
             for (int r = 0; r < 3; r++)
@@ -79,9 +80,9 @@ static void assemble(const pal_rigid_clusters *p, const pal_block_matrix *a, pal
                     for (int m = 0; m < 3; m++) block[r][c] += bi[m][r] * half[m][c];
             for (int r = 0; r < 6; r++)
                 for (int c = 0; c < 6; c++) turned[r][c] = block[c][r];
-            if (p->part[i] >= p->part[j]) add_block(to, p->part[i], p->part[j], block);
-            if (p->part[i] < p->part[j] || (p->part[i] == p->part[j] && i != j))
-                add_block(to, p->part[j], p->part[i], turned);
+            if (p->cluster[i] >= p->cluster[j]) add_block(to, p->cluster[i], p->cluster[j], block);
+            if (p->cluster[i] < p->cluster[j] || (p->cluster[i] == p->cluster[j] && i != j))
+                add_block(to, p->cluster[j], p->cluster[i], turned);
         }
     double largest = 0;
     for (int i = 0; i < to->n; i++)
@@ -90,22 +91,23 @@ static void assemble(const pal_rigid_clusters *p, const pal_block_matrix *a, pal
         for (size_t c = 0; c < 3; c++) to->value[9 * (size_t)to->start[i] + 4 * c] += SHIFT * largest;
 }
 
-pal_err pal_rigid_clusters_make(const pal_block_matrix *a, const double *x, const uint8_t *fixed, double part_m,
+pal_err pal_rigid_clusters_make(const pal_block_matrix *a, const double *x, const uint8_t *fixed, double cluster_m,
                                 pal_arena *arena, pal_rigid_clusters *out)
 {
     *out = (pal_rigid_clusters){.n = a->n};
-    PAL_TRY(find_parts(out, x, fixed, part_m, arena));
+    PAL_TRY(find_clusters(out, x, fixed, cluster_m, arena));
     int32_t *node = PAL_NEW(arena, int32_t, 4 * (size_t)a->start[a->n]);
-    if (!node || !PAL_NEW_DOUBLES(arena, 6 * (size_t)out->n_part, &out->r, &out->z)) return PAL_ERR_MEMORY;
+    if (!node || !PAL_NEW_DOUBLES(arena, 6 * (size_t)out->n_cluster, &out->r, &out->z)) return PAL_ERR_MEMORY;
     pal_cliques pairs = {.n_corner = 4, .node = node};
     for (int j = 0; j < a->n; j++)
         for (int32_t k = a->start[j]; k < a->start[j + 1]; k++) {
-            const int32_t p = out->part[a->row[k]], q = out->part[j], of[4] = {2 * p, 2 * p + 1, 2 * q, 2 * q + 1};
+            const int32_t p = out->cluster[a->row[k]], q = out->cluster[j],
+                          of[4] = {2 * p, 2 * p + 1, 2 * q, 2 * q + 1};
             if (p < 0 || q < 0) continue;
             memcpy(node + 4 * (size_t)pairs.n_item++, of, sizeof of);
         }
     pal_block_matrix coarse;
-    PAL_TRY(pal_block_matrix_make(2 * out->n_part, &pairs, 1, arena, &coarse));
+    PAL_TRY(pal_block_matrix_make(2 * out->n_cluster, &pairs, 1, arena, &coarse));
     assemble(out, a, &coarse);
     PAL_TRY(pal_cholesky_create(&coarse, NULL, &out->factor));
     return pal_cholesky_factor(out->factor, &coarse, false);
@@ -113,9 +115,9 @@ pal_err pal_rigid_clusters_make(const pal_block_matrix *a, const double *x, cons
 
 void pal_rigid_clusters_add(const pal_rigid_clusters *p, const double *r, double *out)
 {
-    memset(p->r, 0, 6 * sizeof(double) * (size_t)p->n_part);
+    memset(p->r, 0, 6 * sizeof(double) * (size_t)p->n_cluster);
     for (int i = 0; i < p->n; i++) {
-        double moment[3], *to = p->part[i] < 0 ? NULL : p->r + 6 * (size_t)p->part[i];
+        double moment[3], *to = p->cluster[i] < 0 ? NULL : p->r + 6 * (size_t)p->cluster[i];
         if (!to) continue;
         pal_cross3(moment, p->arm + 3 * (size_t)i, r + 3 * (size_t)i);
         pal_add3(to, to, r + 3 * (size_t)i), pal_add3(to + 3, to + 3, moment);
@@ -123,8 +125,8 @@ void pal_rigid_clusters_add(const pal_rigid_clusters *p, const double *r, double
     if (pal_cholesky_solve(p->factor, p->r, p->z)) return;
     for (int i = 0; i < p->n; i++) {
         double move[3];
-        if (p->part[i] < 0) continue;
-        const double *z = p->z + 6 * (size_t)p->part[i];
+        if (p->cluster[i] < 0) continue;
+        const double *z = p->z + 6 * (size_t)p->cluster[i];
         pal_cross3(move, z + 3, p->arm + 3 * (size_t)i);
         pal_add3(out + 3 * (size_t)i, out + 3 * (size_t)i, z), pal_add3(out + 3 * (size_t)i, out + 3 * (size_t)i, move);
     }

@@ -107,7 +107,7 @@ typedef struct pal_robustness_report {
      * undecided. */
     bool rests, late; /* late: the processor time was over before it did */
     /* it does not come to rest because a moving support drives it: it is compared with an undisturbed run */
-    bool led;
+    bool driven;
     double settle_s; /* simulated time until rest */
     /* lowest angular frequency of the slowest body and the largest time constant; 0: not known */
     double lowest_1_s, tau_s;

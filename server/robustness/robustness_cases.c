@@ -135,7 +135,7 @@ static pal_err run_all(pal_trial *trial, pal_robustness_report *out)
     out->late = trial->rest_late = trial->late;
     /* a scene that did not come to rest because a support drives it is compared with an undisturbed run */
     if (!trial->rests && !trial->late && pal_world_find_component(trial->world, -1, "moving_support") >= 0)
-        out->led = !pal_world_create(trial->scene, NULL, &trial->twin);
+        out->driven = !pal_world_create(trial->scene, NULL, &trial->twin);
     pal_trial_save(trial, trial->rest);
     trial->rest_J = pal_world_energy_J(trial->world);
     const double max_cpu_s = o->max_cpu_s > 0 ? o->max_cpu_s : enough_s(trial);

@@ -67,7 +67,7 @@ static double body_deviation_S(const pal_trial *trial, int body_index)
 
 /* Springs whose shape was destroyed, and bodies stopped by their safeguards where the case allows it, need not
  * return by themselves. */
-static bool excused(const pal_trial *trial, int b)
+static bool may_remain(const pal_trial *trial, int b)
 {
     return trial->may_stay[b] || (trial->may_stop[b] && trial->stopped[b]);
 }
@@ -76,7 +76,7 @@ double pal_trial_deviation_S(const pal_trial *trial, bool required)
 {
     double max = 0;
     for (int b = 0; b < trial->scene->n_body; b++) {
-        double left = required && excused(trial, b) ? 0 : body_deviation_S(trial, b);
+        double left = required && may_remain(trial, b) ? 0 : body_deviation_S(trial, b);
         if (!(left <= max)) max = left;
     }
     return max;
@@ -277,7 +277,7 @@ static int count_inverted(const pal_trial *trial, uint64_t *n_recovery)
     *n_recovery = 0;
     for (int b = 0; b < trial->scene->n_body; b++) {
         const pal_body *body = pal_world_body(trial->world, b);
-        if (excused(trial, b)) continue;
+        if (may_remain(trial, b)) continue;
         if (body->interpolation) *n_recovery += body->safeguards.n_inversion;
         for (int t = 0; body->tets && !body->interpolation && t < body->tets->n_tet; t++) {
             const int32_t *tet = body->tets->tet + 4 * (size_t)t;
@@ -370,7 +370,7 @@ static void sum_safeguards(pal_trial *trial)
     for (int b = 0; b < trial->scene->n_body; b++) {
         const pal_safeguards *from = &pal_world_body(trial->world, b)->safeguards;
         to->n_capped += from->n_capped, to->n_clamped += from->n_clamped, to->n_mass_scaled += from->n_mass_scaled;
-        to->n_inversion += from->n_inversion, to->n_split += from->n_split, to->n_search += from->n_search;
+        to->n_inversion += from->n_inversion, to->n_change += from->n_change, to->n_search += from->n_search;
         to->n_tool_reset += from->n_tool_reset, to->n_stopped += from->n_stopped, to->ns += from->ns;
     }
 }
@@ -485,12 +485,12 @@ void pal_trial_run_case(pal_trial *trial, const pal_robustness_case *which, doub
         which->run(trial);
         sum_safeguards(trial);
         judge_steps(trial);
-        bool all_excused = true;
+        bool none_must_return = true;
         for (int b = 0; b < trial->scene->n_body; b++) {
-            all_excused = all_excused && excused(trial, b);
+            none_must_return = none_must_return && may_remain(trial, b);
             collapsed |= trial->may_stay[b] && (trial->stopped[b] || !(body_deviation_S(trial, b) <= PAL_RETURN_S));
         }
-        if (trial->late && !all_excused)
+        if (trial->late && !none_must_return)
             pal_trial_report(trial, PAL_CAUSE_SECONDS, "the time was over after %.1f simulated s", out->simulated_s);
         if (out->frozen || collapsed) check_reset(trial, seconds);
         if (collapsed) pal_trial_report(trial, PAL_CAUSE_COLLAPSED, "springs that may not recover");

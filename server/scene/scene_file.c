@@ -75,7 +75,7 @@ static pal_err read_material(const pal_json *body, pal_material *m)
     PAL_TRY(pal_json_number(&at, "young_Pa", PAL_YOUNG_MIN_PA, PAL_YOUNG_MAX_PA, &m->young_Pa));
     PAL_TRY(pal_json_number(&at, "poisson", PAL_POISSON_MIN, PAL_POISSON_MAX, &m->poisson));
     PAL_TRY(pal_json_number(&at, "density_kg_m3", PAL_DENSITY_MIN_KG_M3, PAL_DENSITY_MAX_KG_M3, &m->density_kg_m3));
-    PAL_TRY(pal_json_number(&at, "damping_ratio", 0, PAL_DAMPING_RATIO_MAX, &m->damping_ratio));
+    PAL_TRY(pal_json_number(&at, "damping_ratio", 0, PAL_FACTOR_MAX, &m->damping_ratio));
     return pal_json_number(&at, "damping_1_s", 0, PAL_NUMBER_MAX, &m->damping_1_s);
 }
 

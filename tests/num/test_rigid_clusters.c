@@ -58,7 +58,7 @@ static void what_is_rigid_comes_back(void)
     pal_rigid_clusters p;
     make(1e-3);
     REQUIRE(!pal_rigid_clusters_make(&a, x, fixed, 3, arena, &p));
-    CHECK_INT(p.n_part, 3);
+    CHECK_INT(p.n_cluster, 3);
     for (int k = 0; k < 12; k++) {
         double u[3 * N] = {0}, r[3 * N] = {0}, back[3 * N] = {0};
         for (int i = 0; i < N; i++) {
@@ -102,7 +102,7 @@ static void a_singular_body_has_a_correction(void)
     for (int single = 0; single < 2; single++) {
         make(single ? 1 : 0);
         REQUIRE(!pal_rigid_clusters_make(&a, x, fixed, single ? 0.5 : 3, arena, &p));
-        CHECK_INT(p.n_part, single ? N : 3);
+        CHECK_INT(p.n_cluster, single ? N : 3);
         double r[3 * N], out[3 * N] = {0};
         for (int i = 0; i < 3 * N; i++) r[i] = pal_random_unit(9, (uint64_t)i) - 0.5;
         pal_rigid_clusters_add(&p, r, out);

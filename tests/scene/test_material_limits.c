@@ -110,11 +110,11 @@ static void the_damping_ratio_has_one_range(void)
 {
     static const char *const key =
         "{\"bodies\": [{\"mesh\": \"ball.palmesh\", \"model\": {\"name\": \"fem\"}, \"material\": {\"%s\": %.17g}}]}";
-    CHECK(is_parsed(key, "damping_ratio", 0) && is_parsed(key, "damping_ratio", PAL_DAMPING_RATIO_MAX));
-    CHECK(!is_parsed(key, "damping_ratio", -1e-9) && !is_parsed(key, "damping_ratio", 1.001 * PAL_DAMPING_RATIO_MAX));
+    CHECK(is_parsed(key, "damping_ratio", 0) && is_parsed(key, "damping_ratio", PAL_FACTOR_MAX));
+    CHECK(!is_parsed(key, "damping_ratio", -1e-9) && !is_parsed(key, "damping_ratio", 1.001 * PAL_FACTOR_MAX));
     /* the number that stands for a derived damping is none that a scene may give */
     CHECK(!is_parsed(key, "damping_1_s", PAL_DAMPING_DERIVED));
-    pal_material m = {5000, 0.4, 1000, PAL_DAMPING_DERIVED, PAL_DAMPING_RATIO_MAX};
+    pal_material m = {5000, 0.4, 1000, PAL_DAMPING_DERIVED, PAL_FACTOR_MAX};
     CHECK_INT(pal_material_check(&m, NULL), 0);
     m.damping_ratio = NAN;
     CHECK_INT(pal_material_check(&m, NULL), PAL_ERR_REFUSED);

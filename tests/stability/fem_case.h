@@ -143,13 +143,13 @@ static inline void hard_steps(fem_beam *b, double seconds, double dt_s, hard_run
     const double size = fabs(first) > 0 ? fabs(first) : 1;
     *out = (hard_run){.finite = true, .max = 0, .return_s = INFINITY};
     for (int i = 0; i < n; i++) {
-        uint64_t n_change = b->body->safeguards.n_split;
+        uint64_t n_change = b->body->safeguards.n_change;
         pal_err err = pal_world_step(b->world, dt_s);
         out->finite = out->finite && !err && pal_body_finite(b->body) && !b->body->frozen;
         if (!out->finite) return;
         double now = pal_world_energy_J(b->world) - hard_work_J(b->body);
         out->max = fmax(out->max, now / size);
-        if (b->body->safeguards.n_split == n_change) out->rise = fmax(out->rise, (now - before) / size);
+        if (b->body->safeguards.n_change == n_change) out->rise = fmax(out->rise, (now - before) / size);
         before = now;
         if (hard_rms(b->body) > 1e-3 * b->body->length_scale_m || hard_inverted(b) > 0)
             out->return_s = INFINITY;

@@ -113,8 +113,8 @@ static void mirrored_hexahedra_are_found_recovered_and_counted(void)
         hard_steps(&b, 3, 1.0 / 60, &run);
         CHECK_LE(run.max, 1.01);
         CHECK_LE(run.return_s, 3);
-        CHECK(b.body->safeguards.n_inversion > 0 && b.body->safeguards.n_split >= 2 &&
-              b.body->safeguards.n_split % 2 == 0);
+        CHECK(b.body->safeguards.n_inversion > 0 && b.body->safeguards.n_change >= 2 &&
+              b.body->safeguards.n_change % 2 == 0);
         CHECK(!hard_recovers(&b));
         beam_free(&b);
     }

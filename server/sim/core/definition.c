@@ -70,7 +70,7 @@ pal_err pal_material_check(pal_material *material, pal_diagnostic *diag)
                  {"poisson", material->poisson, PAL_POISSON_MIN, PAL_POISSON_MAX},
                  {"density_kg_m3", material->density_kg_m3, PAL_DENSITY_MIN_KG_M3, PAL_DENSITY_MAX_KG_M3},
                  {"damping_1_s", derived ? 0 : material->damping_1_s, 0, PAL_NUMBER_MAX},
-                 {"damping_ratio", material->damping_ratio, 0, PAL_DAMPING_RATIO_MAX}};
+                 {"damping_ratio", material->damping_ratio, 0, PAL_FACTOR_MAX}};
     for (size_t i = 0; i < sizeof range / sizeof range[0]; i++)
         if (!(range[i].value >= range[i].low && range[i].value <= range[i].high))
             return PAL_REFUSE(diag, "material.%s: %g is outside [%g, %g]", range[i].key, range[i].value, range[i].low,

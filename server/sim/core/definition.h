@@ -21,7 +21,7 @@ typedef struct pal_material {
     double damping_1_s;
     double damping_ratio; /* 1: of a derived rate, over the critical damping 2 w1 of the slowest mode */
 } pal_material;
-#define PAL_DAMPING_DERIVED (-1.0)
+enum { PAL_DAMPING_DERIVED = -1 };
 
 /* another material in a part of the body; the last region that contains a point wins. Numbers that are NaN keep the
  * body's */
@@ -58,8 +58,8 @@ typedef struct pal_support_def {
 
 /* A stroke of a soft brush over the material at rest (painting, paper A section 4.1; model subdivision_fem). Within
  * radius_m of at_m, Young's modulus and density are multiplied by factor^w; w is 1 up to (1 - softness) radius_m and
- * falls smoothly to 0 at radius_m. Strokes multiply. Ranges: factors 1 / PAL_STROKE_FACTOR_MAX to
- * PAL_STROKE_FACTOR_MAX, softness 0 to 1, radius_m above 0 */
+ * falls smoothly to 0 at radius_m. Strokes multiply. Ranges: factors 1 / PAL_FACTOR_MAX to
+ * PAL_FACTOR_MAX, softness 0 to 1, radius_m above 0 */
 typedef struct pal_stroke {
     double at_m[3], radius_m, softness; /* body frame, rest shape */
     double young_factor, density_factor;

@@ -86,9 +86,9 @@ pal_err pal_stroke_check(const pal_stroke *s, pal_diagnostic *diag)
     if (!(s->radius_m > 0 && s->radius_m <= PAL_NUMBER_MAX))
         return PAL_REFUSE(diag, "radius_m: %g, wanted more than 0", s->radius_m);
     if (!(s->softness >= 0 && s->softness <= 1)) return PAL_REFUSE(diag, "softness: %g, wanted 0 to 1", s->softness);
-    if (!(s->young_factor >= 1 / PAL_STROKE_FACTOR_MAX && s->young_factor <= PAL_STROKE_FACTOR_MAX))
+    if (!(s->young_factor >= 1 / PAL_FACTOR_MAX && s->young_factor <= PAL_FACTOR_MAX))
         return PAL_REFUSE(diag, "young_factor: %g, wanted 1e-6 to 1e6", s->young_factor);
-    if (!(s->density_factor >= 1 / PAL_STROKE_FACTOR_MAX && s->density_factor <= PAL_STROKE_FACTOR_MAX))
+    if (!(s->density_factor >= 1 / PAL_FACTOR_MAX && s->density_factor <= PAL_FACTOR_MAX))
         return PAL_REFUSE(diag, "density_factor: %g, wanted 1e-6 to 1e6", s->density_factor);
     return PAL_ERR_OK;
 }

@@ -12,14 +12,14 @@ typedef struct pal_safeguards {
     uint64_t n_clamped;     /* node displacements shortened by the solver                                      */
     uint64_t n_mass_scaled; /* sub-steps with added mass, since the budget of sub-steps was used up            */
     uint64_t n_inversion;   /* updates that found inverted elements, which then ran on their recovery          */
-    uint64_t n_split;       /* changes between elements and recovery; not in the sum, since n_inversion counts */
+    uint64_t n_change;      /* changes between elements and recovery; not in the sum, since n_inversion counts */
     uint64_t n_search;      /* implicit steps repeated with line search, because the energy had risen          */
     uint64_t n_tool_reset;  /* tools that stayed too deep, moved to the nearest place outside                  */
     uint64_t n_stopped;     /* the body was frozen: at most 1, since it then waits for its reset               */
     uint64_t ns;            /* time that all of them took                                                      */
 } pal_safeguards;
 
-/* how many in all; n_split is left out, since n_inversion covers it [any] */
+/* how many in all; n_change is left out, since n_inversion covers it [any] */
 static inline uint64_t pal_safeguards_sum(const pal_safeguards *s)
 {
     return s->n_capped + s->n_clamped + s->n_mass_scaled + s->n_inversion + s->n_search + s->n_tool_reset +

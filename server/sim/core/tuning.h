@@ -27,10 +27,9 @@
 /* 1/s: the largest rate that is derived from the lowest frequency. Soft tissue comes to rest within a second with it;
  * bodies with w1 above 2 1/s have it (tests/sim/plan/test_damping.c) */
 #define PAL_DAMPING_1_S 4.0
-/* largest damping ratio of mode 1: the cap holds long before (tests/scene/test_material_limits.c) */
-#define PAL_DAMPING_RATIO_MAX 1e3
-/* factors of a paint stroke, up or down (tests/scene/test_subdivision_scene.c) */
-#define PAL_STROKE_FACTOR_MAX 1e6
+/* factors of a paint stroke, up or down, and the damping ratio of mode 1, whose rate has its cap long before
+ * (tests/scene/test_subdivision_scene.c, test_material_limits.c) */
+#define PAL_FACTOR_MAX 1e6
 /* nodes of a grid of spring constants */
 enum { PAL_SPRING_GRID_NODES_MAX = 1 << 20 };
 

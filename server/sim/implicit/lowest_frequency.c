@@ -19,7 +19,7 @@ typedef struct search {
     bool assembled;          /* blocks give K v; else the components' tangents do */
     uint8_t *skip;           /* dofs that do not move [n_dof] */
     pal_incomplete_cholesky incomplete;
-    pal_rigid_clusters parts;
+    pal_rigid_clusters clusters;
 } search;
 
 static void clear(const search *s, double *v)
@@ -50,7 +50,7 @@ static void precondition(void *user, const double *r, double *out)
 {
     const search *s = user;
     pal_incomplete_cholesky_solve(&s->incomplete, r, out);
-    pal_rigid_clusters_add(&s->parts, r, out);
+    pal_rigid_clusters_add(&s->clusters, r, out);
 }
 
 /* ---- K by differences of forces ---- */
@@ -82,7 +82,7 @@ static pal_err probe(search *s, pal_arena *arena)
     pal_body *body = s->body;
     pal_interpolated_system groups = {.rest = s->blocks};
     PAL_TRY(pal_interpolated_system_group(&groups, body, arena));
-    if (6.0 * groups.n_group * body->n_dof > PAL_FREQUENCY_WORK_MAX) return PAL_ERR_BUDGET;
+    if (6.0 * groups.n_group * body->n_dof > PAL_PROBE_WORK_MAX) return PAL_ERR_BUDGET;
     double *low = PAL_NEW(arena, double, 3 * (size_t)body->n_dof), move_m = PAL_DIFFERENCE_H * body->edge_m;
     if (!low) return PAL_ERR_MEMORY;
     for (int move = 0; move < 3 * groups.n_group; move++) {
@@ -133,7 +133,8 @@ static double find_scale(const search *s)
     return max;
 }
 
-/* an incomplete factor of K and the rigid motions of its parts; K is shifted by a little mass where it is singular */
+/* an incomplete factor of K and the rigid motions of its clusters; K is shifted by a little mass where it is singular
+ */
 static pal_err make_preconditioner(search *s, pal_arena *arena, double scale_1_s2)
 {
     const pal_body *body = s->body;
@@ -143,8 +144,8 @@ static pal_err make_preconditioner(search *s, pal_arena *arena, double scale_1_s
             double *at = &s->blocks.value[9 * (size_t)s->blocks.start[i] + 4 * c];
             *at += PAL_FREQUENCY_SHIFT * fmax(scale_1_s2 * body->mass_kg[i], *at);
         }
-    PAL_TRY(
-        pal_rigid_clusters_make(&s->blocks, body->x_rest, s->skip, PAL_FREQUENCY_PART * spacing_m, arena, &s->parts));
+    PAL_TRY(pal_rigid_clusters_make(&s->blocks, body->x_rest, s->skip, PAL_FREQUENCY_CLUSTER * spacing_m, arena,
+                                    &s->clusters));
     PAL_TRY(pal_incomplete_cholesky_make(&s->blocks, s->skip, arena, &s->incomplete));
     return pal_incomplete_cholesky_factor(&s->incomplete, &s->blocks);
 }
@@ -198,7 +199,7 @@ pal_err pal_lowest_frequency_find(const pal_build *build, double *mode)
     own.arena = arena, own.diag = NULL;
     build->body->lowest_1_s = build->body->lowest_error = 0;
     pal_err err = find(&s, &own, mode);
-    pal_rigid_clusters_destroy(&s.parts);
+    pal_rigid_clusters_destroy(&s.clusters);
     pal_arena_destroy(arena);
     /* without a preconditioner, or beyond the bounded work, it is not known */
     return err == PAL_ERR_NUMERIC || err == PAL_ERR_BUDGET ? PAL_ERR_OK : err;

@@ -35,17 +35,15 @@
 #define PAL_FREQUENCY_TOLERANCE 5e-3
 #define PAL_FREQUENCY_SHIFT     1e-12
 #define PAL_FREQUENCY_ZERO      1e-10
-/* forces of a node that the search may evaluate to find a stiffness without tangents: about a second
- * (tests/sim/implicit/test_lowest_frequency.c) */
-#define PAL_FREQUENCY_WORK_MAX 2e7
-/* edge of a rigid part in distances of points: 150 to 850 parts on bodies of 2,600 to 17,000 points, whose factor is a
- * tenth of the work (tests/sim/implicit/test_lowest_frequency.c) */
-#define PAL_FREQUENCY_PART 3
 
 enum {
-    /* products with all nodes, times nodes, that finding an interpolated matrix may take at load: ten seconds of 500
-     * operations for a node (tests/sim/implicit/test_interpolated_implicit.c) */
+    /* products with all nodes, times nodes, that finding an interpolated matrix may take at load, ten seconds of 500
+     * operations for a node; forces of a node that finding a stiffness without tangents may take, about a second
+     * (tests/sim/implicit/test_interpolated_implicit.c, test_lowest_frequency.c) */
     PAL_PROBE_WORK_MAX = 20000000,
+    /* edge of a rigid cluster in distances of points: 150 to 850 clusters on bodies of 2,600 to 17,000 points, whose
+     * factor is a tenth of the work (tests/sim/implicit/test_lowest_frequency.c) */
+    PAL_FREQUENCY_CLUSTER = 3,
     /* iterations of the search at most: several times what bodies with loose border elements take */
     PAL_FREQUENCY_ITERATIONS = 300,
     /* columns of an interpolated matrix found again in a simulated second after an edit, each the work of one product:

@@ -124,7 +124,7 @@ void pal_recovery_transfer(pal_recovery *r, const pal_recovery *from)
     memcpy(r->of, from->of, sizeof r->of);
     const bool any = r->n_region > 0 || from->n_region > 0;
     r->n_region = from->n_region, r->was_bad = from->was_bad, r->bad_s = from->bad_s, r->tank_J = 0;
-    r->debt_J = from->debt_J, r->booked_J = from->booked_J, r->seen_s = from->seen_s, r->touched = true;
+    r->debt_J = from->debt_J, r->counted_J = from->counted_J, r->seen_s = from->seen_s, r->touched = true;
     memcpy(r->d_m, from->d_m, 3 * sizeof *r->d_m * (size_t)r->n_node);
     memcpy(r->load_N, from->load_N, 3 * sizeof *r->load_N * (size_t)r->n_node);
     if (any) apply_regions(r);
@@ -482,7 +482,7 @@ static void fix(pal_recovery *r, const pal_body *body, bool changed)
     }
 }
 
-/* ---- the book ---- */
+/* ---- the account of energy ---- */
 
 static double total_J(const pal_step *step)
 {
@@ -493,7 +493,7 @@ static double total_J(const pal_step *step)
 }
 
 /* what the loads of the last update have put in since, J; NAN: contact did, whose forces change within a sub-step.
- * Where loads have changed the book begins anew, so that release is followed by no more energy than there was */
+ * Where loads have changed the account begins anew, so that release is followed by no more energy than there was */
 static double work_J(pal_recovery *r, const pal_body *body)
 {
     double sum = 0;
@@ -636,11 +636,11 @@ static bool update(pal_recovery *r, pal_step *step, double passed_s)
     for (int p = 0; p < r->n_region; p++) good |= !r->of[p].bad;
     if (acted) {
         fix(r, body, false);
-        r->booked_J -= total_J(step); /* now what is lost since then */
+        r->counted_J -= total_J(step); /* now what is lost since then */
         if (step->finds_balance)
             r->tank_J = INFINITY;
         else
-            update_tank(r, body, r->booked_J);
+            update_tank(r, body, r->counted_J);
         stiffen(r, step->finds_balance ? INFINITY : passed_s);
     }
     if (good) {
@@ -654,7 +654,7 @@ static bool update(pal_recovery *r, pal_step *step, double passed_s)
     if (changed) begin(r, body, before_J + regions_J(r));
     if (r->n_region == 0) r->tank_J = r->debt_J = 0;
     if (r->n_region == 0) return changed;
-    r->booked_J = total_J(step);
+    r->counted_J = total_J(step);
     save_loads(r, body);
     return changed;
 }
@@ -686,7 +686,7 @@ unsigned pal_recovery_update(pal_recovery *r, pal_step *step)
     r->bad_s = bad && r->was_bad ? r->bad_s + passed_s : 0;
     r->was_bad = bad;
     const bool acted = r->n_region > 0, changed = update(r, step, passed_s);
-    body->safeguards.n_split += acted != (r->n_region > 0);
+    body->safeguards.n_change += acted != (r->n_region > 0);
     body->safeguards.n_inversion++;
     body->safeguards.ns += pal_clock_ns() - began;
     const bool at_rest = acted && pal_body_kinetic_J(body) < PAL_REST_SHARE * regions_J(r);

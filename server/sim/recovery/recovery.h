@@ -20,7 +20,7 @@
  * elements again when all its ratios are within PAL_RECOVERED_LOW to _HIGH, it would store little
  * (PAL_RECOVERY_LEAVE_STRAIN; not asked for any longer after PAL_RECOVERY_WHOLE_S) and the tank can pay.
  *
- * Energy book. A tank T >= 0, empty when the first region is formed, receives what the body dissipates (its energy
+ * Energy. A tank T >= 0, empty when the first region is formed, receives what the body dissipates (its energy
  * less the work of lasting loads; nothing while contact acts) and pays for every change at fixed x: of s, of the
  * elements in regions, of material or supports. A change that T cannot pay is made smaller: s begins at most so large
  * that the energy does not rise, and rises to 1 as T permits, within PAL_RECOVERY_STIFFEN_S at the fastest. Without
@@ -100,7 +100,7 @@ typedef struct pal_recovery {
     double bad_s;         /* time for which that has lasted                                             */
     double tank_J;        /* T                                                                          */
     double debt_J;        /* put in by the floor of s and not yet dissipated                            */
-    double booked_J;      /* kinetic energy and energy of all components after the last update          */
+    double counted_J;     /* kinetic energy and energy of all components after the last update          */
     double *d_m, *load_N; /* of the nodes then                                        [n_node][3]    */
     bool touched;         /* some of these loads came from contact                                      */
     double seen_s;        /* world time of the last update                                              */

@@ -58,12 +58,12 @@ static void inverted_bodies_recover(void)
             pal_copy3(x + 3 * j, keep);
         }
         /* of a world that follows another: they go on */
-        b.body.safeguards.n_inversion = 1000, b.body.safeguards.n_split = 500;
+        b.body.safeguards.n_inversion = 1000, b.body.safeguards.n_change = 500;
         CHECK(hex_effect->recovery.recover(b.row, &b.step) & PAL_INVERTED);
         CHECK(pal_recovery_acts(b.row->recovery));
         relax(&b, 300);
         CHECK(b.body.safeguards.n_inversion > 1000 && b.body.safeguards.n_inversion <= 1301);
-        CHECK(b.body.safeguards.n_split >= 502 && b.body.safeguards.n_split <= 510);
+        CHECK(b.body.safeguards.n_change >= 502 && b.body.safeguards.n_change <= 510);
         CHECK(!pal_recovery_acts(b.row->recovery));
         CHECK_LE(0.9, pal_hex_min_corner(b.row, &b.body));
         CHECK_LE(hex_energy(&b), 1e-3 * small);

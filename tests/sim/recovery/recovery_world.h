@@ -39,7 +39,7 @@ static inline pal_recovery *recovery_state(const fem_beam *b)
 /* what never rises without loads, while there are regions */
 static inline double recovery_book_J(const pal_recovery *r)
 {
-    return r->booked_J + r->tank_J - r->debt_J;
+    return r->counted_J + r->tank_J - r->debt_J;
 }
 
 /* 0: mirrored, 1: shuffled, 2: in one point */

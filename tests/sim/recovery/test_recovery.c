@@ -168,7 +168,7 @@ static void with_nothing_inverted_there_is_one_pass_and_no_other_work(void)
     hex_body_free(&b);
 }
 
-/* without loads the book only goes down: of motion, elements, regions and tank, less what the floor has put in */
+/* without loads the account only goes down: of motion, elements, regions and tank, less what the floor has put in */
 static void energy_and_tank_never_rise_without_loads(void)
 {
     for (int k = 0; k < RECOVERY_KINDS; k++)
@@ -185,7 +185,7 @@ static void energy_and_tank_never_rise_without_loads(void)
                 REQUIRE(!pal_world_step(b.world, 1.0 / 60));
                 if (r->n_region > 0) {
                     CHECK_LE(recovery_book_J(r), before + noise * first);
-                    CHECK_LE(pal_world_energy_J(b.world), r->booked_J + noise * first);
+                    CHECK_LE(pal_world_energy_J(b.world), r->counted_J + noise * first);
                     acted = true;
                 }
                 before = r->n_region > 0 ? recovery_book_J(r) : INFINITY;

@@ -219,7 +219,7 @@ static void recovery_conserves_momentum_and_angular_momentum(void)
     printf("  regions in %d steps of %d, momentum off by %.2g, angular by %.2g, energy %.3g of the first at most\n",
            n_region, steps, pal_dist3(p[1], p[0]) / pal_norm3(p[0]), pal_dist3(l[1], l[0]) / pal_norm3(l[0]),
            max_J / first_J);
-    CHECK(n_region > 0 && b.body->safeguards.n_split > 0);
+    CHECK(n_region > 0 && b.body->safeguards.n_change > 0);
     CHECK_LE(pal_dist3(p[1], p[0]), 1e-12 * pal_norm3(p[0]));
     CHECK_LE(pal_dist3(l[1], l[0]), 1e-10 * pal_norm3(l[0]));
     CHECK_LE(max_J, 1.01 * first_J);
@@ -264,7 +264,7 @@ static void bodies_without_recovery_have_no_memory_for_it(void)
         CHECK(!set->lattice && !set->all && !set->around && !set->of_tet);
     }
     for (int i = 0; i < 10; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
-    CHECK(b.body->safeguards.n_inversion == 0 && b.body->safeguards.n_split == 0);
+    CHECK(b.body->safeguards.n_inversion == 0 && b.body->safeguards.n_change == 0);
     box_bench_close(&b);
     REQUIRE(box_bench_make(&b, (const int[3]){2, 2, 2}, 0.01, true, false));
     pal_entry_init(&b.scene->body[0].solver, "solver", "static_newton");
@@ -438,7 +438,7 @@ static void a_body_without_inversion_moves_to_the_same_bits(void)
         pal_world_invalidate_limits(b.world, 0);
         for (int i = 0; i < 60; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
         hash[recover] = pal_world_hash(b.world);
-        CHECK(b.body->safeguards.n_inversion == 0 && b.body->safeguards.n_split == 0);
+        CHECK(b.body->safeguards.n_inversion == 0 && b.body->safeguards.n_change == 0);
         n_byte[recover] = pal_world_bytes(b.world);
         n_tet = b.body->tets->n_tet, n_node = b.body->n_node;
         box_bench_close(&b);

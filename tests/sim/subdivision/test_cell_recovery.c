@@ -80,7 +80,7 @@ static void a_region_begins_with_no_more_energy_than_its_elements(void)
             cell_body b;
             recovery(&b, i, seed);
             const double before = cell_energy(&b);
-            /* but for what the least s puts in, which is booked */
+            /* but for what the least s puts in, which is counted */
             if (look(&b)) CHECK_LE(cell_energy(&b), before * (1 + 1e-12) + b.row->recovery->debt_J);
             n_region += b.row->recovery->n_region;
             CHECK((b.row->recovery->n_region > 0) == (recovering(&b) > 0));
