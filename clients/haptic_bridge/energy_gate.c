@@ -45,8 +45,9 @@ void pal_energy_gate_settle(pal_energy_gate *gate, double stored_J)
     gate->stored_J = stored_J;
 }
 
-double pal_energy_gate_damping(const pal_energy_gate *gate, double speed_m_s, double dt_s, double max_Ns_m)
+double pal_energy_gate_damping(const pal_energy_gate *gate, double speed_m_s, double dt_s)
 {
-    if (gate->tank_J >= 0 || !(speed_m_s > REST_SPEED_M_S)) return 0;
-    return fmin(max_Ns_m, -gate->tank_J / (speed_m_s * speed_m_s * dt_s));
+    if (!(speed_m_s > REST_SPEED_M_S)) return 0;
+    const double fill = REFILL_DAMPING_NS_M * fmin(fmax(1 - gate->tank_J / TANK_START_J, 0), 1);
+    return fmax(fill, -gate->tank_J / (speed_m_s * speed_m_s * dt_s));
 }

@@ -47,6 +47,8 @@ struct pal_servo {
     pal_workspace place;
     double fade, fade_rate, clutch_fade, scale_down, mean_square;
     double force_prev[3], torque_prev[3]; /* commanded in the last tick, device axes */
+    /* force and torque that the motors are driven to and that they are taken to give, device axes */
+    double motor_to[2][3], motor[2][3];
     pal_dev_state device;
     pal_local_blend blend;
     pal_local_contact_state memory;
@@ -235,6 +237,23 @@ static void servo_move_frame(pal_servo *s)
     pal_workspace_restart(&s->place);
 }
 
+/* Work of the hand on the device since the last pose. The motors follow a command one tick and MOTOR_LAG_S late: a spring
+ * gives energy by that, which the damping floor takes and the tank must not count as income */
+static double servo_work(pal_servo *s, double dt)
+{
+    const double left = exp(-dt / MOTOR_LAG_S), mean = (1 - left) * MOTOR_LAG_S / dt;
+    const double *moved[2] = {s->place.step_d, s->place.turn_d}, *next[2] = {s->force_prev, s->torque_prev};
+    double work = 0;
+    for (int i = 0; i < 2; i++)
+        for (int k = 0; k < 3; k++) {
+            const double to = s->motor_to[i][k], off = s->motor[i][k] - to;
+            work -= (to + mean * off) * moved[i][k];
+            s->motor[i][k] = to + left * off;
+            s->motor_to[i][k] = next[i][k];
+        }
+    return work;
+}
+
 /* pose of the device and the hand's work since the last one; false: the device gave nothing usable */
 static bool servo_read(pal_servo *s, double dt)
 {
@@ -246,7 +265,7 @@ static bool servo_read(pal_servo *s, double dt)
     pal_workspace_move(&s->place, &state, hold, dt);
     if (hold != was) servo_event(s, PAL_EVENT_CLUTCH, hold, 0, hold ? "clutch held" : "clutch released");
     s->device = state;
-    const double work = -pal_dot3(s->force_prev, s->place.step_d) - pal_dot3(s->torque_prev, s->place.turn_d);
+    const double work = servo_work(s, dt);
     if (s->o.info.dof_out > 3 && !hold) {
         double turn[3];
         pal_workspace_to_world(&s->place, s->place.turn_d, turn);
@@ -445,15 +464,14 @@ static bool servo_cut(const pal_servo *s, double force_d[3], double torque_d[3],
     return size > s->cap_N;
 }
 
-/* damping of a stale model and of the passivity controller, and the walls; device axes */
+/* Damping and walls, device axes */
 static void servo_own_forces(pal_servo *s, double dt, double force_d[3])
 {
-    const double b_max = s->o.info.damping_max_Ns_m, *v = s->place.v_d;
-    double wall[3], wall_J, b = 0;
-    if (s->stale) b = s->fade > 0 ? STALE_DAMPING_NS_M : FREE_DAMPING_NS_M;
-    const double controller = pal_energy_gate_damping(&s->gate, pal_norm3(v), dt, b_max);
-    if (controller > 0) s->view.n_passivity++;
-    pal_axpy3(force_d, -fmin(b_max, fmax(b, controller)), v);
+    double wall[3], wall_J, stale = 0;
+    if (s->stale) stale = s->fade > 0 ? STALE_DAMPING_NS_M : FREE_DAMPING_NS_M;
+    const double gate = pal_energy_gate_damping(&s->gate, pal_norm3(s->place.v_d), dt);
+    if (gate > 0) s->view.n_passivity++;
+    pal_axpy3(force_d, -fmin(s->o.info.damping_max_Ns_m, fmax(stale, gate)), s->place.v_d);
     const bool at_wall = pal_workspace_walls(&s->place, &s->o.info, DAMPING_FLOOR_S, wall, &wall_J);
     if (at_wall) pal_axpy3(force_d, s->use.wall_gain, wall);
     if (at_wall && !s->at_wall) servo_event(s, PAL_EVENT_WORKSPACE_EDGE, 0, 0, "edge of the workspace");

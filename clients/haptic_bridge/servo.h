@@ -17,7 +17,7 @@
  *   - ESTOP and FAULT give no force until re-armed. E-stop is latched. A fault of speed, number or stalled loop re-arms
  *     by the conditions of ARMING; a device that does not answer does not re-arm.
  *
- * Limits: |F| <= cap, rising by at most cap / 10 ms and falling without limit. An rms over 1 s above the device's
+ * Limits: |F| <= cap, rising by at most cap / 10 ms and falling without limit. An rms over 10 s above the device's
  * continuous rating scales force down. Stiffness of a contact or a grasp <= device limit / (scale force_scale), 300 N/m
  * without real time. Walls of 200 N/m stand at 95 % of the workspace.
  *

@@ -27,8 +27,13 @@
  * its stiffness; 5 mJ bounds what a hand can ever get back at once */
 #define TANK_START_J 1e-3
 #define TANK_MAX_J   5e-3
+/* s. Time constant that motors are taken to have, besides one tick of delay: that of a current loop and a cable drive.
+ * Without it the tank spends what the motors' lag has given already (test_bridge_rendering: 0.14 mJ a pass) */
+#define MOTOR_LAG_S 1e-3
 /* s. A model is blended in over at least this time, or over the distance of two models */
 #define BLEND_MIN_S 0.02
+/* N s/m. Damping that refills an empty tank, falling to 0 at TANK_START_J: 7.5 mW at 50 mm/s */
+#define REFILL_DAMPING_NS_M 3.0
 /* bisections for the share of a change that the tank pays: 2^-12 of a tick's change */
 enum { GATE_BISECTIONS = 12 };
 
@@ -55,7 +60,9 @@ enum { GATE_BISECTIONS = 12 };
 #define VELOCITY_CUT_HZ    80.0  /* of the filter on position differences: above what a hand moves, below encoder noise */
 #define USER_CAP_N         3.0   /* largest force unless asked otherwise */
 #define RISE_TIME_S        0.01  /* from none to the cap */
-#define RATING_TIME_S      1.0   /* of the mean square that is compared with the continuous rating */
+/* s. Of the mean square that is compared with the continuous rating. Makers state it for a day, small motors warm in
+ * 10 to 20 s; over 1 s a pull of 4 s at twice the rating would be felt at half its force (test_bridge_rendering) */
+#define RATING_TIME_S      10.0
 #define SCALE_DOWN_S       2.0   /* from full force to none while above it */
 #define SCALE_UP_S         5.0   /* and back */
 #define STALE_DAMPING_NS_M 3.0   /* while a stale model fades */
