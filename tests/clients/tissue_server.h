@@ -41,6 +41,7 @@ typedef struct tissue_options {
 typedef struct tissue_rig {
     tissue_options o;
     void *device;
+    pal_dev_info info;
     pal_servo *servo;
     uint64_t now_ns, next_frame_ns, seed;
     uint32_t seq, generation, n_pose;
@@ -175,6 +176,7 @@ static inline bool tissue_open(tissue_rig *r, const char *id, const tissue_optio
     if (s.rotation[0] == 0 && s.rotation[1] == 0 && s.rotation[2] == 0)
         s.rotation[0] = s.rotation[4] = s.rotation[8] = 1;
     if (pal_device_virtual()->open(&r->device, id, &s.info)) return false;
+    r->info = s.info;
     s.device = r->device;
     pal_device_virtual()->force_enable(r->device, 1);
     return pal_servo_create(&s, &r->servo) == PAL_ERR_OK;
