@@ -32,7 +32,7 @@ struct pal_bridge_net {
     double radius_m;
     uint32_t generation, pose_seq, echo_seq, model_newest, event_seq, status_seq;
     uint64_t joined_ns, model_ns, n_status;
-    bool placed;  /* the place of the workspace is known */
+    bool placed; /* the place of the workspace is known */
     bool has_up;
     double up[3]; /* of the device, in the world */
     pal_workspace_frame frame;
@@ -60,8 +60,8 @@ static void net_model(pal_bridge_net *n, const pal_wire_haptic *model)
     pal_servo_put_model(n->servo, model, n->generation, pal_clock_now_ns(n->o.servo.clock));
 }
 
-/* Places the workspace: its up is the scene's, and its centre, unless given, where the tool's centre touches the organ at
- * rest from above. No pose is sent before, because it could lie within the organ */
+/* Places the workspace: its up is the scene's, and its centre, unless given, where the tool's centre touches the organ
+ * at rest from above. No pose is sent before, because it could lie within the organ */
 static void net_place(pal_bridge_net *n)
 {
     n->frame.scale = n->o.servo.scale;
@@ -245,7 +245,7 @@ static void net_send_config(pal_bridge_net *n)
                                       .f_user = (float)s->force_cap_N,
                                       .k_max = (float)s->info.stiffness_max_N_m,
                                       .b_max = (float)s->info.damping_max_Ns_m,
-                                                                            .scale = (float)s->scale,
+                                      .scale = (float)s->scale,
                                       .fscale = (float)s->force_scale,
                                       .tank_mJ = (float)(1e3 * TANK_MAX_J),
                                       .leak_mW = (float)(1e3 * s->leak_W)};

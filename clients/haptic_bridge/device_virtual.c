@@ -51,9 +51,10 @@ static const char *const virtual_scripts[] = {"still", "press-hold", "cycle", "r
 /* the script grasp: height that the hand intends at the end of each phase, and the phase's length */
 static const struct {
     double up_m, seconds;
-} virtual_grasp[] = {[PAL_VIRTUAL_TOUCH] = {0, 0.5}, [PAL_VIRTUAL_CLOSED] = {0, 0.5}, [PAL_VIRTUAL_PULL] = {0.03, 2},
-                     [PAL_VIRTUAL_HOLD] = {0.03, 2}, [PAL_VIRTUAL_BACK] = {0, 2},     [PAL_VIRTUAL_OPEN] = {0.02, 1},
-                     [PAL_VIRTUAL_DONE] = {0.02, INFINITY}};
+} virtual_grasp[] = {
+    [PAL_VIRTUAL_TOUCH] = {0, 0.5},       [PAL_VIRTUAL_CLOSED] = {0, 0.5}, [PAL_VIRTUAL_PULL] = {0.03, 2},
+    [PAL_VIRTUAL_HOLD] = {0.03, 2},       [PAL_VIRTUAL_BACK] = {0, 2},     [PAL_VIRTUAL_OPEN] = {0.02, 1},
+    [PAL_VIRTUAL_DONE] = {0.02, INFINITY}};
 
 typedef struct virtual_state {
     const virtual_device *device;

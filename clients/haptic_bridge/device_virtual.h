@@ -4,19 +4,15 @@
  *
  * id: "touch" or "touch,key=value,..." with the devices touch premium omega3 inverse3 falcon and the keys
  *   hand    average light firm off       (average; off: no hand, a constant push of 0.5 N downward)
- *   script  still press-hold cycle ramp stroke tap grasp   (press-hold): intended motion of the hand along the device's z.
- *           All but still first descend at 40 mm/s until a force of 0.1 N. Then
- *           press-hold: `depth` further down in 0.5 s, hold; cycle: down and up at 1 Hz; ramp: down at depth / 6 s;
- *           stroke: press-hold, then 20 mm back and forth along y; tap: down at 0.3 m/s and up, once a second;
- *           grasp: close the grasp 0.5 s after the touch, 30 mm up in 2 s, hold for 2 s, back in 2 s, let go and up
- *   depth   of the script, mm (8)
- *   height  start above the workspace centre, mm (20)
- *   wait    time at rest before the script, s, so that the bridge can arm (1.6)
- *   lag     actuator time constant, ms (1)
- *   clock   wall steps virtual (wall): wall: read advances to the present. steps: read advances by what the servo has
- *           slept on pal_virtual_clock, so that a servo loop on a busy machine is slow and never late. virtual: only
- *           pal_virtual_advance does
- *   fail    number of the first read that fails, like a broken cable; all later reads fail too (none) */
+ *   script  still press-hold cycle ramp stroke tap grasp   (press-hold): intended motion of the hand along the device's
+ * z. All but still first descend at 40 mm/s until a force of 0.1 N. Then press-hold: `depth` further down in 0.5 s,
+ * hold; cycle: down and up at 1 Hz; ramp: down at depth / 6 s; stroke: press-hold, then 20 mm back and forth along y;
+ * tap: down at 0.3 m/s and up, once a second; grasp: close the grasp 0.5 s after the touch, 30 mm up in 2 s, hold for 2
+ * s, back in 2 s, let go and up depth   of the script, mm (8) height  start above the workspace centre, mm (20) wait
+ * time at rest before the script, s, so that the bridge can arm (1.6) lag     actuator time constant, ms (1) clock wall
+ * steps virtual (wall): wall: read advances to the present. steps: read advances by what the servo has slept on
+ * pal_virtual_clock, so that a servo loop on a busy machine is slow and never late. virtual: only pal_virtual_advance
+ * does fail    number of the first read that fails, like a broken cable; all later reads fail too (none) */
 #ifndef PAL_HAPTIC_BRIDGE_DEVICE_VIRTUAL_H
 #define PAL_HAPTIC_BRIDGE_DEVICE_VIRTUAL_H
 #include "clients/haptic_bridge/device.h"

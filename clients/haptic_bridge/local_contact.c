@@ -25,8 +25,8 @@ static double smooth_fall(double low, double high, double at)
     return t >= 1 ? 0 : 1 - t * t * (3 - 2 * t);
 }
 
-/* normal force and its integral at depth d: k1 d + k2 d^2, from the depth where the tangent leaves [0, k_max] on straight,
- * from f_max on constant */
+/* normal force and its integral at depth d: k1 d + k2 d^2, from the depth where the tangent leaves [0, k_max] on
+ * straight, from f_max on constant */
 static void patch_elastic(const pal_local_patch *p, double d, const pal_local_limits *limits, acting *a)
 {
     const double k_max = limits->stiffness_max_N_m, f_max = limits->force_max_N, k1 = p->k1_N_m, k2 = p->k2_N_m2;

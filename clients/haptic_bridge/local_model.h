@@ -1,11 +1,12 @@
 /* The contact model that a bridge renders: patches of the server's zero-force surface and the two-sided spring of a
  * grasp, in world coordinates, as a blend of the model before and the newest one.
  *
- * A share lambda in [0, 1] of the newest model is in use; planes, stiffnesses and spring are interpolated in it. A patch
- * is the same one in both when id and group agree and its convex group has the same patches; any other patch comes in
- * from stiffness 0 or goes out to it, and a group whose patches changed is replaced as a whole. A grasp is interpolated
- * in f = f0 - K (x - x0), and comes and goes likewise. Its K is symmetrised and its eigenvalues are clamped to [0, limit];
- * along an axis without stiffness its force has no bounded energy and is left out. Thread: [servo]; no heap, no locks. */
+ * A share lambda in [0, 1] of the newest model is in use; planes, stiffnesses and spring are interpolated in it. A
+ * patch is the same one in both when id and group agree and its convex group has the same patches; any other patch
+ * comes in from stiffness 0 or goes out to it, and a group whose patches changed is replaced as a whole. A grasp is
+ * interpolated in f = f0 - K (x - x0), and comes and goes likewise. Its K is symmetrised and its eigenvalues are
+ * clamped to [0, limit]; along an axis without stiffness its force has no bounded energy and is left out. Thread:
+ * [servo]; no heap, no locks. */
 #ifndef PAL_HAPTIC_BRIDGE_LOCAL_MODEL_H
 #define PAL_HAPTIC_BRIDGE_LOCAL_MODEL_H
 #include "protocol/wire.h"
@@ -50,8 +51,8 @@ typedef struct pal_local_blend {
 
 /* the model at share lambda, surfaces moved on by age_s */
 void pal_local_blend_mix(const pal_local_blend *blend, double lambda, double age_s, pal_local_model *out);
-/* starts a blend from the model in use (lambda, age_s) to a new one; false: a number in it is not finite, and nothing has
- * changed */
+/* starts a blend from the model in use (lambda, age_s) to a new one; false: a number in it is not finite, and nothing
+ * has changed */
 bool pal_local_blend_start(pal_local_blend *blend, double lambda, double age_s, const pal_wire_haptic *model,
                            const pal_local_limits *limits);
 #endif

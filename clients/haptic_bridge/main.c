@@ -46,7 +46,8 @@ static void main_on_signal(int number)
     if (number == SIGUSR2 && main_servo) pal_servo_rearm(main_servo);
 }
 
-/* the script grasp: what is rendered and what the tissue gives while the hand holds; ends the program when it is done */
+/* the script grasp: what is rendered and what the tissue gives while the hand holds; ends the program when it is done
+ */
 static void main_watch_grasp(bridge *b, const pal_servo_view *v)
 {
     const pal_servo_options *o = &b->net_options.servo;
@@ -311,7 +312,9 @@ int main(int argc, char **argv)
          "end before that once all is reached: models, poses, force_N, stale, free=1"},
         {"--force-cap", "N", PAL_FLAG_NUMBER, &servo->force_cap_N, 0, 20, "largest force (3, and the device's peak)"},
         {"--origin", "X,Y,Z", PAL_FLAG_VECTOR, servo->origin_m, 0, 0, "world place of the workspace's centre, m"},
-        {"--up", "X,Y,Z", PAL_FLAG_VECTOR, net->up, 0, 0, "world direction of the device's up; its x, to the user, and y, right, are level (up of the scene; LCM: 0,0,1)"},
+        {"--up", "X,Y,Z", PAL_FLAG_VECTOR, net->up, 0, 0,
+         "world direction of the device's up; its x, to the user, and y, right, are level (up of the scene; LCM: "
+         "0,0,1)"},
         {"--scale", "S", PAL_FLAG_NUMBER, &servo->scale, 0.01, 100, "world metres per device metre (1)"},
         {"--force-scale", "S", PAL_FLAG_NUMBER, &servo->force_scale, 0.01, 100, "device newtons per world newton (1)"},
         {"--leak-mW", "MW", PAL_FLAG_NUMBER, &b.leak_mW, 0, 10,

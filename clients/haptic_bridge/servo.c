@@ -45,6 +45,7 @@ struct pal_servo {
     const pal_workspace_frame *next_frame; /* waits until it may be applied */
     int degraded, bad_reads;
     pal_workspace place;
+    double blend_s; /* of the newest model */
     double fade, fade_rate, clutch_fade, scale_down, mean_square;
     double force_prev[3], torque_prev[3]; /* commanded in the last tick, device axes */
     /* force and torque that the motors are driven to and that they are taken to give, device axes */
@@ -87,6 +88,7 @@ pal_err pal_servo_create(const pal_servo_options *options, pal_servo **out)
     s->model.empty = true;
     s->first = true;
     s->clutch_fade = s->scale_down = 1;
+    s->blend_s = BLEND_MIN_S;
     s->view.state = options->pose_only ? PAL_SERVO_FREE : PAL_SERVO_ARMING;
     *out = s;
     return PAL_ERR_OK;
@@ -173,7 +175,8 @@ static double servo_energy_scale(const pal_servo *s)
 static pal_local_limits servo_limits(const pal_servo *s, double stiffness_max_N_m)
 {
     return (pal_local_limits){.stiffness_max_N_m = stiffness_max_N_m,
-                              .damping_max_Ns_m = s->o.info.damping_max_Ns_m / (s->place.frame.scale * s->o.force_scale),
+                              .damping_max_Ns_m =
+                                  s->o.info.damping_max_Ns_m / (s->place.frame.scale * s->o.force_scale),
                               .damping_floor_s = s->o.hand_off ? DAMPING_FLOOR_HAND_OFF_S : DAMPING_FLOOR_S,
                               .force_max_N = s->cap_N / s->o.force_scale};
 }
@@ -237,11 +240,11 @@ static void servo_move_frame(pal_servo *s)
     pal_workspace_restart(&s->place);
 }
 
-/* Work of the hand on the device since the last pose. The motors follow a command one tick and MOTOR_LAG_S late: a spring
- * gives energy by that, which the damping floor takes and the tank must not count as income */
+/* Work of the hand on the device since the last pose. The motors follow a command one tick and MOTOR_TIME_S late: a
+ * spring gives energy by that, which the damping floor takes and the tank must not count as income */
 static double servo_work(pal_servo *s, double dt)
 {
-    const double left = exp(-dt / MOTOR_LAG_S), mean = (1 - left) * MOTOR_LAG_S / dt;
+    const double left = exp(-dt / MOTOR_TIME_S), mean = (1 - left) * MOTOR_TIME_S / dt;
     const double *moved[2] = {s->place.step_d, s->place.turn_d}, *next[2] = {s->force_prev, s->torque_prev};
     double work = 0;
     for (int i = 0; i < 2; i++)
@@ -293,8 +296,13 @@ static void servo_take_model(pal_servo *s)
         s->view.n_model_old++;
         return;
     }
-    if (!s->model.empty && fresh->arrival_ns > s->model.arrival_ns)
-        s->gap_s[s->n_gap++ % SERVO_GAPS] = (double)(fresh->arrival_ns - s->model.arrival_ns) * 1e-9;
+    double gap = 0;
+    if (!s->model.empty && fresh->arrival_ns > s->model.arrival_ns) {
+        gap = (double)(fresh->arrival_ns - s->model.arrival_ns) * 1e-9;
+        s->gap_s[s->n_gap++ % SERVO_GAPS] = gap;
+    }
+    /* a slow server changes its mind by more at once */
+    s->blend_s = fmin(fmax(BLEND_MIN_S, fmax(gap, 1e-6 * fresh->haptic.frame_us)), BLEND_MAX_S);
     const pal_local_limits limits = servo_limits(s, s->use.stiffness_max_N_m);
     if (!pal_local_blend_start(&s->blend, s->use.lambda, s->use.age_s, &fresh->haptic, &limits)) {
         s->view.n_not_finite++;
@@ -380,11 +388,10 @@ static bool servo_states(pal_servo *s, uint64_t now, double dt)
 /* what should be rendered now, changed by no more than a tick's step */
 static servo_use servo_wanted(const pal_servo *s, uint64_t now, double dt)
 {
-    const double blend_s = fmax(BLEND_MIN_S, 1e-6 * s->model.haptic.frame_us);
     const double gain = s->fade * s->clutch_fade * s->scale_down;
     double k_max = s->o.info.stiffness_max_N_m;
     if (s->degraded >= 1) k_max = fmin(k_max, DEGRADED_K_N_M);
-    return (servo_use){.lambda = fmin(1, s->use.lambda + dt / blend_s),
+    return (servo_use){.lambda = fmin(1, s->use.lambda + dt / s->blend_s),
                        .age_s = fmin(servo_model_age_s(s, now), EXTRAPOLATE_MAX_S),
                        .gain = fmin(gain, s->use.gain + dt * s->fade_rate),
                        .wall_gain = fmin(s->scale_down, s->use.wall_gain + dt / FADE_START_S),
@@ -515,8 +522,8 @@ static void servo_render(pal_servo *s, uint64_t now, double dt, double force_d[3
     memcpy(v->proxy_m, contact.proxy_m, sizeof v->proxy_m);
     v->rendered_stiffness_N_m = contact.depth_m > 0 ? pal_norm3(contact.force_N) / contact.depth_m : 0;
     const bool acts = s->use.gain > 0 && (contact.n_contact > 0 || s->model.haptic.has_grasp);
-    v->state = s->stale && s->fade > 0 && v->n_model > 0 ? PAL_SERVO_STALE
-                                                          : (acts ? PAL_SERVO_CONTACT : PAL_SERVO_FREE);
+    v->state =
+        s->stale && s->fade > 0 && v->n_model > 0 ? PAL_SERVO_STALE : (acts ? PAL_SERVO_CONTACT : PAL_SERVO_FREE);
 }
 
 static void servo_publish(pal_servo *s, uint64_t now)

@@ -101,8 +101,8 @@ void pal_servo_end(pal_servo *servo);
 void pal_servo_put_model(pal_servo *servo, const pal_wire_haptic *model, uint32_t generation, uint64_t arrival_ns);
 /* [net] the server is lost or has returned as another session: drops the model at once and fades */
 void pal_servo_put_generation(pal_servo *servo, uint32_t generation);
-/* [net] another place of the workspace in the world; applied while there is no force, another scale only while the clutch
- * is held or before forces start */
+/* [net] another place of the workspace in the world; applied while there is no force, another scale only while the
+ * clutch is held or before forces start */
 void pal_servo_put_frame(pal_servo *servo, const pal_workspace_frame *frame);
 void pal_servo_estop(pal_servo *servo);   /* [any] async-signal-safe; takes effect within one tick */
 void pal_servo_rearm(pal_servo *servo);   /* [any] clears e-stop: ARMING follows                   */
@@ -118,7 +118,7 @@ typedef struct pal_servo_view {
     int n_proxy;
     double proxy_m[PAL_LOCAL_PATCH_MAX][3]; /* tool's centre on the surface of each contact, for display */
     double fade, grip;                      /* fade: gain of the model that is rendered */
-    uint32_t flags, buttons; /* PAL_WIRE_POSE_*, PAL_WIRE_GRASP       */
+    uint32_t flags, buttons;                /* PAL_WIRE_POSE_*, PAL_WIRE_GRASP       */
     uint32_t model_seq, model_age_us;
     uint64_t model_stamp_us;
     uint64_t n_model, n_model_old, n_saturated, n_clamped, n_stale, n_fault, n_not_finite;

@@ -2,7 +2,7 @@
 #ifndef PAL_HAPTIC_BRIDGE_TUNING_H
 #define PAL_HAPTIC_BRIDGE_TUNING_H
 
-/* ---- rendered model (test_local_contact, test_local_model) ---- */
+/* ---- rendered model (test_local_contact) ---- */
 
 /* s. A moving surface is extrapolated for at most this time: two to three models at 60 Hz */
 #define EXTRAPOLATE_MAX_S 0.05
@@ -29,9 +29,11 @@
 #define TANK_MAX_J   5e-3
 /* s. Time constant that motors are taken to have, besides one tick of delay: that of a current loop and a cable drive.
  * Without it the tank spends what the motors' lag has given already (test_bridge_rendering: 0.14 mJ a pass) */
-#define MOTOR_LAG_S 1e-3
-/* s. A model is blended in over at least this time, or over the distance of two models */
+#define MOTOR_TIME_S 1e-3
+/* s. A model is blended in over the time since the one before, within these: a tick then changes force by 5 % of what a
+ * model changes at most; above the longest, a model of a slow server would never be in use (test_bridge_rendering) */
 #define BLEND_MIN_S 0.02
+#define BLEND_MAX_S 0.1
 /* N s/m. Damping that refills an empty tank, falling to 0 at TANK_START_J: 7.5 mW at 50 mm/s */
 #define REFILL_DAMPING_NS_M 3.0
 /* bisections for the share of a change that the tank pays: 2^-12 of a tick's change */
@@ -50,16 +52,16 @@ enum { GATE_BISECTIONS = 12 };
 /* N. The clutch engages below this: what 50 ms of fading take away is hardly noticed */
 #define CLUTCH_FORCE_N 0.3
 /* s, m/s. Rest of the handle before forces start */
-#define ARM_REST_S     0.5
-#define ARM_SPEED_M_S  0.05
-#define BAD_READS_MAX  2   /* failed reads in a row: the device is lost */
-#define NO_FORCE_N     0.01 /* the workspace may move below this */
+#define ARM_REST_S    0.5
+#define ARM_SPEED_M_S 0.05
+#define BAD_READS_MAX 2    /* failed reads in a row: the device is lost */
+#define NO_FORCE_N    0.01 /* the workspace may move below this */
 
 /* ---- limits (test_servo) ---- */
 
-#define VELOCITY_CUT_HZ    80.0  /* of the filter on position differences: above what a hand moves, below encoder noise */
-#define USER_CAP_N         3.0   /* largest force unless asked otherwise */
-#define RISE_TIME_S        0.01  /* from none to the cap */
+#define VELOCITY_CUT_HZ 80.0 /* of the filter on position differences: above what a hand moves, below encoder noise */
+#define USER_CAP_N      3.0  /* largest force unless asked otherwise */
+#define RISE_TIME_S     0.01 /* from none to the cap */
 /* s. Of the mean square that is compared with the continuous rating. Makers state it for a day, small motors warm in
  * 10 to 20 s; over 1 s a pull of 4 s at twice the rating would be felt at half its force (test_bridge_rendering) */
 #define RATING_TIME_S      10.0

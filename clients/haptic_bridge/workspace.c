@@ -43,8 +43,8 @@ void pal_workspace_quat(const double rotation[9], double q[4])
         if (square[k] > square[big]) big = k;
     const double yz = m[7] - m[5], zx = m[2] - m[6], xy = m[3] - m[1];
     const double ab = m[1] + m[3], bc = m[5] + m[7], ca = m[2] + m[6];
-    const double row[4][4] = {{square[0], yz, zx, xy}, {yz, square[1], ab, ca}, {zx, ab, square[2], bc},
-                              {xy, ca, bc, square[3]}};
+    const double row[4][4] = {
+        {square[0], yz, zx, xy}, {yz, square[1], ab, ca}, {zx, ab, square[2], bc}, {xy, ca, bc, square[3]}};
     memcpy(q, row[big], sizeof row[big]);
     quat_unit(q);
 }

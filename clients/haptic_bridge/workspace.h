@@ -1,6 +1,6 @@
-/* The device in the world: x_w = origin + scale R (x_d - centre), q_w = R q_d q_h. While the clutch is held the world pose stands still and
- * centre and handle's turn follow the device. Velocities are filtered differences of the device's pose. Soft walls stand at 95 % of
- * the device's workspace. Thread: [servo]; no heap, no locks. */
+/* The device in the world: x_w = origin + scale R (x_d - centre), q_w = R q_d q_h. While the clutch is held the world
+ * pose stands still and centre and handle's turn follow the device. Velocities are filtered differences of the device's
+ * pose. Soft walls stand at 95 % of the device's workspace. Thread: [servo]; no heap, no locks. */
 #ifndef PAL_HAPTIC_BRIDGE_WORKSPACE_H
 #define PAL_HAPTIC_BRIDGE_WORKSPACE_H
 #include "clients/haptic_bridge/device.h"
@@ -9,9 +9,9 @@
 
 /* how device and world lie to each other */
 typedef struct pal_workspace_frame {
-    double origin_m[3];  /* world position of the workspace's centre */
-    double rotation[9];  /* device axes to world, row-major; a proper rotation */
-    double scale;        /* world metres per device metre */
+    double origin_m[3]; /* world position of the workspace's centre */
+    double rotation[9]; /* device axes to world, row-major; a proper rotation */
+    double scale;       /* world metres per device metre */
 } pal_workspace_frame;
 
 /* rotation whose device axis z (up) is up, a unit vector; x, to the user, and y, to the right, are level */

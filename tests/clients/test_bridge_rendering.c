@@ -35,7 +35,8 @@ static void stiffness_of_linear_tissue_is_rendered_within_1_percent_at_every_del
 {
     for (int k = 0; k < 3; k++)
         for (int t = 0; t < 5; t++) {
-            const tissue_options o = {.k1 = (double[]){60, 150, 300}[k], .rtt_s = (double[]){0, 0.02, 0.05, 0.1, 0.2}[t]};
+            const tissue_options o = {.k1 = (double[]){60, 150, 300}[k],
+                                      .rtt_s = (double[]){0, 0.02, 0.05, 0.1, 0.2}[t]};
             double off;
             const double error = ramp_error("inverse3", &o, &off);
             printf("  linear %3.0f N/m, round trip %3.0f ms: slope %.2f %%, worst force error %.3f N\n", o.k1,
@@ -50,8 +51,8 @@ static void stiffness_of_hardening_tissue_is_rendered_within_5_percent_at_200_ms
         const tissue_options o = {.k1 = 100, .k2 = 15000, .rtt_s = (double[]){0, 0.02, 0.05, 0.1, 0.2}[t]};
         double off;
         const double error = ramp_error("inverse3", &o, &off);
-        printf("  100 N/m + 15 N/mm^2 d^2, round trip %3.0f ms: slope %.2f %%, worst force error %.3f N\n", o.rtt_s * 1e3,
-               100 * error, off);
+        printf("  100 N/m + 15 N/mm^2 d^2, round trip %3.0f ms: slope %.2f %%, worst force error %.3f N\n",
+               o.rtt_s * 1e3, 100 * error, off);
         CHECK_LE(error, 0.05);
     }
 }
@@ -132,12 +133,15 @@ static void grasp_is_rendered_within_2_percent_at_0_and_5_percent_at_100_ms(void
 }
 
 /* 20 passes of 1 Hz in and out of hardening tissue, of which the surface rests or breathes. A pass begins in the air. A
- * breathing surface pushes and takes back, so the mean of its passes counts; and in no pass may the hand get more than the
- * tank had at its beginning */
+ * breathing surface pushes and takes back, so the mean of its passes counts; and in no pass may the hand get more than
+ * the tank had at its beginning */
 static void passes_give_the_hand_no_more_energy_than_the_tank(void)
 {
     for (int run = 0; run < 30; run++) {
-        const tissue_options o = {.k1 = 200, .k2 = 8000, .breath_m = run % 2 ? 0.002 : 0, .breath_hz = 0.23,
+        const tissue_options o = {.k1 = 200,
+                                  .k2 = 8000,
+                                  .breath_m = run % 2 ? 0.002 : 0,
+                                  .breath_hz = 0.23,
                                   .rtt_s = (double[]){0, 0.02, 0.05, 0.1, 0.2}[run / 6],
                                   .loss = (double[]){0, 0.05, 0.2}[run / 2 % 3]};
         tissue_rig r;
@@ -170,7 +174,8 @@ static void passes_give_the_hand_no_more_energy_than_the_tank(void)
             last = r.given_J;
         }
         const double mean = (last - first) / 19;
-        printf("  %s, round trip %3.0f ms, loss %2.0f %%: running total %.3f mJ (servo %.3f), mean pass %.3f mJ (as commanded %.3f), worst "
+        printf("  %s, round trip %3.0f ms, loss %2.0f %%: running total %.3f mJ (servo %.3f), mean pass %.3f mJ (as "
+               "commanded %.3f), worst "
                "%.3f; step %.3f N, force error rms %.3f N of %.2f N, stale %d\n",
                run % 2 ? "breathes" : "rests   ", o.rtt_s * 1e3, 100 * o.loss, 1e3 * r.given_max_J, r.view.generated_mJ,
                1e3 * mean, 1e3 * (r.command_J - command) / 19, 1e3 * worst, r.view.jump_max_N, sqrt(squares / n), peak,
@@ -205,9 +210,10 @@ static void jittery_models_of_a_held_tool_stay_calm(void)
             tissue_normal(&r, x, r.now_ns, &depth, &N);
             wanted += N / 8000;
         }
-        printf("  %s, +-20 %% and +-1 mm: step %.3f N, generated %.3f mJ (servo %.3f), speed rms %.2f mm/s, max %.1f mm/s, mean force %.2f N of %.2f N\n",
-               devices[d], r.view.jump_max_N, 1e3 * r.given_max_J, r.view.generated_mJ, 1e3 * sqrt(squares / 8000), 1e3 * fastest,
-               force, wanted);
+        printf("  %s, +-20 %% and +-1 mm: step %.3f N, generated %.3f mJ (servo %.3f), speed rms %.2f mm/s, max %.1f "
+               "mm/s, mean force %.2f N of %.2f N\n",
+               devices[d], r.view.jump_max_N, 1e3 * r.given_max_J, r.view.generated_mJ, 1e3 * sqrt(squares / 8000),
+               1e3 * fastest, force, wanted);
         CHECK_LE(r.view.jump_max_N, 0.3);
         CHECK_LE(1e3 * r.given_max_J, 1.1);
         CHECK_LE(1e3 * sqrt(squares / 8000), 5);
@@ -233,7 +239,8 @@ static void outage_of_2_s_while_pressing_makes_no_step_and_no_energy(void)
             pal_copy3(at, r.view.force_N);
             if (i > 2000) peak = fmax(peak, tissue_force(&r));
         }
-        printf("  outage, round trip %3.0f ms: step %.3f N, before %.2f N, peak after %.2f N, at the end %.2f N, generated "
+        printf("  outage, round trip %3.0f ms: step %.3f N, before %.2f N, peak after %.2f N, at the end %.2f N, "
+               "generated "
                "%.3f mJ\n",
                o.rtt_s * 1e3, step, before, peak, tissue_force(&r), 1e3 * r.given_max_J);
         CHECK_LE(step, 0.1);

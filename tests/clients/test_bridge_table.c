@@ -1,6 +1,7 @@
 /* Largest tissue stiffness that each device and hand press and hold stably over each network: every stiffness up to the
- * device's limit with a hand, up to half of it with the hand off (a constant push of 0.5 N, and 0.25 N above the friction of 0.6 N of falcon). Beside it the baseline, the
- * tissue's force sent and held. A part of the grid by default; --table runs and prints all of it. */
+ * device's limit with a hand, up to half of it with the hand off (a constant push of 0.5 N, and 0.25 N above the
+ * friction of 0.6 N of falcon). Beside it the baseline, the tissue's force sent and held. A part of the grid by
+ * default; --table runs and prints all of it. */
 #include "tests/check.h"
 #include "tests/clients/tissue_server.h"
 
@@ -15,7 +16,8 @@ enum { N_STIFFNESS = sizeof stiffness / sizeof *stiffness };
  * unstable one rings with tens of mm/s to m/s, or is lost */
 #define REST_RMS_M_S 0.003
 
-static bool holds_stably(const char *device, const char *hand, double k, double rtt, double loss, bool raw, double *limit)
+static bool holds_stably(const char *device, const char *hand, double k, double rtt, double loss, bool raw,
+                         double *limit)
 {
     const tissue_options o = {.k1 = k, .rtt_s = rtt, .loss = loss, .raw = raw};
     const bool off = !strcmp(hand, "off");
@@ -72,8 +74,8 @@ static void every_device_holds_every_stiffness_up_to_its_limit(void)
                 CHECK(wanted > 0);
                 CHECK_LE(wanted, held);
                 if (held < wanted)
-                    printf("  %s, hand %s, round trip %.0f ms, loss %.0f %%: %.0f N/m\n", devices[d], hands[h], 1e3 * rtt,
-                           100 * loss, held);
+                    printf("  %s, hand %s, round trip %.0f ms, loss %.0f %%: %.0f N/m\n", devices[d], hands[h],
+                           1e3 * rtt, 100 * loss, held);
             }
 }
 

@@ -1,5 +1,5 @@
-/* The local contact model against its formulas (clients/haptic_bridge/README.md, "One tick"): normal force, friction, grasp,
- * torque, stored energy. */
+/* The local contact model against its formulas (clients/haptic_bridge/README.md, "One tick"): normal force, friction,
+ * grasp, torque, stored energy. */
 #include "clients/haptic_bridge/local_contact.h"
 #include "server/base/vec3.h"
 #include "tests/check.h"
@@ -302,8 +302,7 @@ static void stored_energy_is_the_integral_of_the_force(void)
         work += pal_dot3(mean, step) / 2;
         pal_copy3(last, r.force_N);
         lowest = fmin(lowest, pal_local_contact_energy(&model, x, &l, &memory));
-        if (i % 1000 == 0)
-            CHECK_NEAR(pal_local_contact_energy(&model, x, &l, &memory) - begin, -work, 1e-6);
+        if (i % 1000 == 0) CHECK_NEAR(pal_local_contact_energy(&model, x, &l, &memory) - begin, -work, 1e-6);
     }
     CHECK(r.clamped || r.saturated || lowest >= 0);
     CHECK(lowest >= 0);

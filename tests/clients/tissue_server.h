@@ -1,9 +1,8 @@
-/* A simulated server and network for tests of the bridge: tissue below a plane, models at 60 Hz, delay lines both ways with
- * jitter, loss and outages; virtual time, deterministic by seed. The tissue is quasi-static:
- *   contact   surface at z = height (t), N = k1 d + k2 d^2 along z; friction mu N with stiffness kt, solved at the poses
- *             that arrive, 60 times a second
- *   grasp     from the pose at which the button came: f = -k r (1 + |r| / length) with r = x - x_grasp
- * A model is what clients/haptic_bridge/README.md says a server sends: the plane of zero force p = x + (F / k) n and the
+/* A simulated server and network for tests of the bridge: tissue below a plane, models at 60 Hz, delay lines both ways
+ * with jitter, loss and outages; virtual time, deterministic by seed. The tissue is quasi-static: contact   surface at
+ * z = height (t), N = k1 d + k2 d^2 along z; friction mu N with stiffness kt, solved at the poses that arrive, 60 times
+ * a second grasp     from the pose at which the button came: f = -k r (1 + |r| / length) with r = x - x_grasp A model
+ * is what clients/haptic_bridge/README.md says a server sends: the plane of zero force p = x + (F / k) n and the
  * tangent k there; f_ref is the tissue's own force. */
 #ifndef TESTS_CLIENTS_TISSUE_SERVER_H
 #define TESTS_CLIENTS_TISSUE_SERVER_H
@@ -28,13 +27,13 @@ typedef struct tissue_message {
 } tissue_message;
 
 typedef struct tissue_options {
-    double k1, k2;             /* N/m, N/m^2 */
-    double mu, kt;             /* friction */
-    double grasp_k, length_m;  /* length 0: linear */
+    double k1, k2;                        /* N/m, N/m^2 */
+    double mu, kt;                        /* friction */
+    double grasp_k, length_m;             /* length 0: linear */
     double height_m, breath_m, breath_hz; /* of the surface */
-    double k_jitter, plane_jitter_m; /* of each model: share, and metres */
-    double rtt_s, loss;        /* round trip, jitter a quarter of it; loss of poses and models */
-    bool raw;                  /* the baseline: the tissue's force is sent and held */
+    double k_jitter, plane_jitter_m;      /* of each model: share, and metres */
+    double rtt_s, loss;                   /* round trip, jitter a quarter of it; loss of poses and models */
+    bool raw;                             /* the baseline: the tissue's force is sent and held */
 } tissue_options;
 
 /* device, servo, network and tissue */
@@ -56,7 +55,7 @@ typedef struct tissue_rig {
     uint32_t raw_seq;
     pal_servo_view view;
     double given_J, given_max_J; /* energy that the motors have given to handle and hand so far, and its maximum */
-    double command_J;            /* the same with the force commanded in place of the motor's, a tick and a lag before it */
+    double command_J; /* the same with the force commanded in place of the motor's, a tick and a lag before it */
 } tissue_rig;
 
 static inline double tissue_height(const tissue_rig *r, uint64_t now_ns)
@@ -79,8 +78,7 @@ static inline void tissue_grasp(const tissue_rig *r, const double x[3], double f
     pal_scale3(f, -r->o.grasp_k * (1 + size * more), away);
     for (int i = 0, at = 0; i < 3; i++)
         for (int j = i; j < 3; j++)
-            K[at++] = r->o.grasp_k * ((i == j) * (1 + size * more) +
-                                      (size > 0 ? more * away[i] * away[j] / size : 0));
+            K[at++] = r->o.grasp_k * ((i == j) * (1 + size * more) + (size > 0 ? more * away[i] * away[j] / size : 0));
 }
 
 /* the model at the newest pose */
@@ -95,11 +93,16 @@ static inline void tissue_solve(tissue_rig *r, pal_wire_haptic *m)
     const double k = fmax(10, tangent * (1 + r->o.k_jitter * random_signed(&r->seed)));
     const double plane = (depth > 0 ? N / k : depth) + r->o.plane_jitter_m * random_signed(&r->seed);
     const double rate = 2 * 3.14159265358979 * r->o.breath_hz;
-    m->patch[0] = (pal_wire_contact_patch){.id = 1, .group = 1, .n = {0, 0, 1}, .p_m = {0, 0, (float)plane},
-                                           .v_m_s = {0, 0, (float)(r->o.breath_m * rate *
-                                                                   cos(rate * (double)r->now_ns * 1e-9))},
-                                           .k1_N_m = (float)k, .kt_N_m = (float)r->o.kt, .mu_s = (float)r->o.mu,
-                                           .mu_d = (float)r->o.mu};
+    m->patch[0] =
+        (pal_wire_contact_patch){.id = 1,
+                                 .group = 1,
+                                 .n = {0, 0, 1},
+                                 .p_m = {0, 0, (float)plane},
+                                 .v_m_s = {0, 0, (float)(r->o.breath_m * rate * cos(rate * (double)r->now_ns * 1e-9))},
+                                 .k1_N_m = (float)k,
+                                 .kt_N_m = (float)r->o.kt,
+                                 .mu_s = (float)r->o.mu,
+                                 .mu_d = (float)r->o.mu};
     m->f_ref_N[2] = (float)N;
     if (N > 0 && r->o.mu > 0) {
         if (!r->has_anchor) pal_copy3(r->anchor, x);
