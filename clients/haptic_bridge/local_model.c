@@ -17,14 +17,17 @@ static void between3(double r[3], const double a[3], const double b[3], double s
 static void patch_mix(const pal_local_patch *a, const pal_local_patch *b, double share, double age_s,
                       pal_local_patch *out)
 {
+    /* planes count by their stiffness, so that k (p - x) is interpolated and not its factors, whose product has a hump
+     */
+    const double k = between(a->k1_N_m, b->k1_N_m, share);
     *out = *b;
-    between3(out->p_m, a->p_m, b->p_m, share);
+    between3(out->p_m, a->p_m, b->p_m, k > 0 ? share * b->k1_N_m / k : share);
     between3(out->v_m_s, a->v_m_s, b->v_m_s, share);
     between3(out->n, a->n, b->n, share);
     /* opposite normals have no direction between: the nearer one */
     if (!pal_unit3(out->n, out->n, 1e-3)) pal_copy3(out->n, share < 0.5 ? a->n : b->n);
     pal_axpy3(out->p_m, fmin(fmax(age_s, 0), EXTRAPOLATE_MAX_S), out->v_m_s);
-    out->k1_N_m = between(a->k1_N_m, b->k1_N_m, share);
+    out->k1_N_m = k;
     out->k2_N_m2 = between(a->k2_N_m2, b->k2_N_m2, share);
     out->b_Ns_m = between(a->b_Ns_m, b->b_Ns_m, share);
     out->kt_N_m = between(a->kt_N_m, b->kt_N_m, share);

@@ -394,7 +394,7 @@ static servo_use servo_wanted(const pal_servo *s, uint64_t now, double dt)
     return (servo_use){.lambda = fmin(1, s->use.lambda + dt / s->blend_s),
                        .age_s = fmin(servo_model_age_s(s, now), EXTRAPOLATE_MAX_S),
                        .gain = fmin(gain, s->use.gain + dt * s->fade_rate),
-                       .wall_gain = fmin(s->scale_down, s->use.wall_gain + dt / FADE_START_S),
+                       .wall_gain = s->degraded == 2 ? 0 : fmin(s->scale_down, s->use.wall_gain + dt / FADE_START_S),
                        .stiffness_max_N_m = k_max / (s->place.frame.scale * s->o.force_scale)};
 }
 
@@ -475,9 +475,10 @@ static bool servo_cut(const pal_servo *s, double force_d[3], double torque_d[3],
 static void servo_own_forces(pal_servo *s, double dt, double force_d[3])
 {
     double wall[3], wall_J, stale = 0;
+    if (s->degraded == 2) return; /* a late loop gives no force at all */
     if (s->stale) stale = s->fade > 0 ? STALE_DAMPING_NS_M : FREE_DAMPING_NS_M;
     const double gate = pal_energy_gate_damping(&s->gate, pal_norm3(s->place.v_d), dt);
-    if (gate > 0) s->view.n_passivity++;
+    if (gate > 0 && s->gate.tank_J < 0) s->view.n_passivity++;
     pal_axpy3(force_d, -fmin(s->o.info.damping_max_Ns_m, fmax(stale, gate)), s->place.v_d);
     const bool at_wall = pal_workspace_walls(&s->place, &s->o.info, DAMPING_FLOOR_S, wall, &wall_J);
     if (at_wall) pal_axpy3(force_d, s->use.wall_gain, wall);

@@ -367,6 +367,23 @@ static void blend_begins_where_it_is_and_ends_at_the_new_model(void)
     }
 }
 
+/* a stiff plane just above the tool and a soft one far above it press alike: so does every blend of the two */
+static void blend_of_equal_forces_has_that_force(void)
+{
+    pal_local_blend blend = {0};
+    pal_wire_haptic stiff = plane(0.001f, 300, 0), soft = plane(0.03f, 10, 0);
+    CHECK(pal_local_blend_start(&blend, 0, 0, &stiff, &limits));
+    CHECK(pal_local_blend_start(&blend, 1, 0, &soft, &limits));
+    const double x[3] = {0.1, -0.2, 0.3};
+    for (int i = 0; i <= 10; i++) {
+        pal_local_model mix;
+        pal_local_contact_result r;
+        pal_local_blend_mix(&blend, 0.1 * i, 0, &mix);
+        pal_local_contact_force(&mix, x, still, 1e-3, &limits, NULL, &r);
+        CHECK_NEAR(r.force_N[2], 0.3, 1e-6);
+    }
+}
+
 int main(void)
 {
     RUN(force_is_k_times_depth);
@@ -387,6 +404,7 @@ int main(void)
     RUN(stiffness_of_a_grasp_is_clamped_along_its_axes);
     RUN(stored_energy_is_the_integral_of_the_force);
     RUN(numbers_that_are_not_finite_are_refused);
+    RUN(blend_of_equal_forces_has_that_force);
     RUN(blend_begins_where_it_is_and_ends_at_the_new_model);
     return check_report();
 }
