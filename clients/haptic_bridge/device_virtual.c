@@ -52,9 +52,9 @@ static const char *const virtual_scripts[] = {"still", "press-hold", "cycle", "r
 static const struct {
     double up_m, seconds;
 } virtual_grasp[] = {
-    [PAL_VIRTUAL_TOUCH] = {0, 0.5},       [PAL_VIRTUAL_CLOSED] = {0, 0.5}, [PAL_VIRTUAL_PULL] = {0.03, 2},
-    [PAL_VIRTUAL_HOLD] = {0.03, 2},       [PAL_VIRTUAL_BACK] = {0, 2},     [PAL_VIRTUAL_OPEN] = {0.02, 1},
-    [PAL_VIRTUAL_DONE] = {0.02, INFINITY}};
+    [PAL_VIRTUAL_TOUCH] = {0, 0.5},     [PAL_VIRTUAL_CLOSED] = {0, 0.5},      [PAL_VIRTUAL_PULL] = {0.03, 2},
+    [PAL_VIRTUAL_SETTLE] = {0.03, 0.5}, [PAL_VIRTUAL_HOLD] = {0.03, 1.5},     [PAL_VIRTUAL_BACK] = {0, 2},
+    [PAL_VIRTUAL_OPEN] = {0.02, 1},     [PAL_VIRTUAL_DONE] = {0.02, INFINITY}};
 
 typedef struct virtual_state {
     const virtual_device *device;

@@ -29,6 +29,7 @@ typedef enum pal_virtual_phase {
     PAL_VIRTUAL_TOUCH,
     PAL_VIRTUAL_CLOSED,
     PAL_VIRTUAL_PULL,
+    PAL_VIRTUAL_SETTLE, /* the first half second of holding, in which models of the pull still arrive */
     PAL_VIRTUAL_HOLD,
     PAL_VIRTUAL_BACK,
     PAL_VIRTUAL_OPEN,

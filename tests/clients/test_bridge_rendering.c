@@ -119,7 +119,7 @@ static void grasp_is_rendered_within_2_percent_at_0_and_5_percent_at_100_ms(void
                    "messages); rms error of the pull %.3f N; step %.3f N, generated %.3f mJ\n",
                    h ? "hardening" : "linear", rtt * 1e3, 1e3 * x_max, rendered / n, wanted / n, reference / n,
                    sqrt(path / n_path), r.view.jump_max_N, r.view.generated_mJ);
-            CHECK(n > 1900);
+            CHECK(n > 1400);
             CHECK(wanted / n > 0.5);
             CHECK_NEAR(rendered / n, wanted / n, (rtt < 0.05 ? 0.02 : 0.05) * wanted / n);
             CHECK_NEAR(reference / n, wanted / n, 0.02 * wanted / n);
@@ -190,6 +190,24 @@ static void passes_give_the_hand_no_more_energy_than_the_tank(void)
     }
 }
 
+/* world = 3 times the device, forces halved: the device renders force_scale scale k, its energy is counted at the
+ * device */
+static void scaled_workspace_renders_its_scaled_stiffness(void)
+{
+    const tissue_options o = {.k1 = 150, .rtt_s = 0.05};
+    const pal_servo_options scaled = {.scale = 3, .force_scale = 0.5};
+    tissue_rig r;
+    REQUIRE(tissue_open(&r, "inverse3,script=press-hold,depth=5,clock=virtual", &o, &scaled));
+    tissue_run(&r, 5);
+    double x[3], v[3], given[3];
+    pal_virtual_truth(r.device, x, v, given);
+    CHECK(x[2] < -0.001);
+    CHECK_NEAR(given[2] / -x[2], 0.5 * 3 * 150, 0.02 * 225); /* an encoder step of 0.02 mm in 2 mm */
+    CHECK_NEAR(r.view.position_m[2], 3 * x[2], 3 * 0.02e-3);
+    CHECK_LE(1e3 * r.given_max_J, 1.005);
+    tissue_close(&r);
+}
+
 static void jittery_models_of_a_held_tool_stay_calm(void)
 {
     static const char *const devices[] = {"touch,hand=average", "premium,hand=light", "inverse3,hand=firm"};
@@ -257,6 +275,7 @@ int main(void)
     RUN(friction_sticks_and_slides_with_mu_N);
     RUN(grasp_is_rendered_within_2_percent_at_0_and_5_percent_at_100_ms);
     RUN(passes_give_the_hand_no_more_energy_than_the_tank);
+    RUN(scaled_workspace_renders_its_scaled_stiffness);
     RUN(jittery_models_of_a_held_tool_stay_calm);
     RUN(outage_of_2_s_while_pressing_makes_no_step_and_no_energy);
     return check_report();
