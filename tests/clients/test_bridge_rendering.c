@@ -208,14 +208,17 @@ static void scaled_workspace_renders_its_scaled_stiffness(void)
     tissue_close(&r);
 }
 
+/* held for 8 s at 300 N/m under models that jitter; quiet: what README asks of a server, 5 % and 0.1 mm */
 static void jittery_models_of_a_held_tool_stay_calm(void)
 {
     static const char *const devices[] = {"touch,hand=average", "premium,hand=light", "inverse3,hand=firm"};
-    for (int d = 0; d < 3; d++) {
-        const tissue_options o = {.k1 = 500, .k_jitter = 0.2, .plane_jitter_m = 1e-3, .rtt_s = 0.05};
+    for (int run = 0; run < 6; run++) {
+        const bool quiet = run >= 3;
+        const tissue_options o = {
+            .k1 = 300, .k_jitter = quiet ? 0.05 : 0.2, .plane_jitter_m = quiet ? 1e-4 : 1e-3, .rtt_s = 0.05};
         char id[128];
         tissue_rig r;
-        snprintf(id, sizeof id, "%s,script=press-hold,depth=8,clock=virtual", devices[d]);
+        snprintf(id, sizeof id, "%s,script=press-hold,depth=4,clock=virtual", devices[run % 3]);
         REQUIRE(tissue_open(&r, id, &o, &plain));
         tissue_run(&r, 4);
         double x[3], v[3], fastest = 0, squares = 0, force = 0, wanted = 0, depth, N;
@@ -228,13 +231,14 @@ static void jittery_models_of_a_held_tool_stay_calm(void)
             tissue_normal(&r, x, r.now_ns, &depth, &N);
             wanted += N / 8000;
         }
-        printf("  %s, +-20 %% and +-1 mm: step %.3f N, generated %.3f mJ (servo %.3f), speed rms %.2f mm/s, max %.1f "
-               "mm/s, mean force %.2f N of %.2f N\n",
-               devices[d], r.view.jump_max_N, 1e3 * r.given_max_J, r.view.generated_mJ, 1e3 * sqrt(squares / 8000),
-               1e3 * fastest, force, wanted);
-        CHECK_LE(r.view.jump_max_N, 0.3);
-        CHECK_LE(1e3 * r.given_max_J, 1.1);
-        CHECK_LE(1e3 * sqrt(squares / 8000), 5);
+        printf("  %s, %s: step %.3f N, generated %.3f mJ, speed rms %.2f mm/s, max %.1f mm/s, mean force %.2f N of "
+               "%.2f N\n",
+               devices[run % 3], quiet ? "+-5 %, +-0.1 mm" : "+-20 %, +-1 mm", r.view.jump_max_N, 1e3 * r.given_max_J,
+               1e3 * sqrt(squares / 8000), 1e3 * fastest, force, wanted);
+        CHECK_LE(r.view.jump_max_N, quiet ? 0.1 : 0.3);
+        CHECK_LE(1e3 * r.given_max_J, 1.005);
+        CHECK_LE(1e3 * sqrt(squares / 8000), quiet ? 1 : 5);
+        if (quiet) CHECK_NEAR(force, wanted, 0.1 * wanted);
         tissue_close(&r);
     }
 }
