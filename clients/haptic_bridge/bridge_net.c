@@ -1,4 +1,5 @@
 #include "clients/haptic_bridge/bridge_net.h"
+#include "clients/haptic_bridge/tuning.h"
 #include "clients/link/asset_store.h"
 #include "clients/link/lcm_convert.h"
 #include "clients/link/lcm_link.h"
@@ -31,7 +32,10 @@ struct pal_bridge_net {
     double radius_m;
     uint32_t generation, pose_seq, echo_seq, model_newest, event_seq, status_seq;
     uint64_t joined_ns, model_ns, n_status;
-    bool placed;  /* the origin of the workspace is known */
+    bool placed; /* the place of the workspace is known */
+    bool has_up;
+    double up[3]; /* of the device, in the world */
+    pal_workspace_frame frame;
     bool touched; /* the device has rendered a force; it is reported once */
     pal_servo_view view;
     pal_servo_timing timing;
@@ -56,17 +60,23 @@ static void net_model(pal_bridge_net *n, const pal_wire_haptic *model)
     pal_servo_put_model(n->servo, model, n->generation, pal_clock_now_ns(n->o.servo.clock));
 }
 
-/* places the workspace where the tool's centre touches the organ at rest from above; no pose is sent before, because it
- * could lie within the organ */
+/* Places the workspace: its up is the scene's, and its centre, unless given, where the tool's centre touches the organ
+ * at rest from above. No pose is sent before, because it could lie within the organ */
 static void net_place(pal_bridge_net *n)
 {
-    double point[3];
-    if (n->o.has_origin || !n->asset || !(n->asset->ready || n->asset->failed)) return;
+    n->frame.scale = n->o.servo.scale;
+    pal_copy3(n->frame.origin_m, n->o.servo.origin_m);
+    pal_workspace_rotation(n->up, n->frame.rotation);
+    if (!n->o.has_origin && n->asset) {
+        if (!n->asset->ready && !n->asset->failed) return;
+        double point[3];
+        if (n->asset->ready && pal_asset_extreme_vertex(n->asset->asset, n->up, point)) {
+            pal_axpy3(point, n->radius_m, n->up);
+            pal_copy3(n->frame.origin_m, point);
+        }
+    }
     n->placed = true;
-    if (!n->asset->ready) return;
-    if (!pal_asset_extreme_vertex(n->asset->asset, n->o.up, point)) return;
-    pal_axpy3(point, n->radius_m, n->o.up);
-    pal_servo_put_origin(n->servo, point);
+    pal_servo_put_frame(n->servo, &n->frame);
 }
 
 static void net_asset(void *user, const pal_stored_asset *asset)
@@ -95,10 +105,8 @@ static void ws_control(void *user, const pal_control *c)
                           ? hello->tool[hello->you_tool].radius_m
                           : 0.01;
         net_joined(n);
-        if (hello->n_part > 0)
-            n->asset = pal_asset_store_request(n->store, hello->part[0].asset);
-        else
-            n->placed = true;
+        if (!n->has_up) pal_unit3(n->up, hello->up, 0.5);
+        n->asset = hello->n_part > 0 ? pal_asset_store_request(n->store, hello->part[0].asset) : NULL;
         net_place(n);
         pal_log(PAL_LOG_INFO, "joined", "%s with tool %d", hello->session, hello->you_tool);
     }
@@ -178,7 +186,9 @@ static void net_send_pose(void *user)
     memcpy(pose.quaternion, v->quat, sizeof pose.quaternion);
     for (int k = 0; k < 3; k++) {
         pose.velocity_m_s[k] = (float)v->velocity_m_s[k];
+        pose.omega_rad_s[k] = (float)v->omega_rad_s[k];
         pose.force_N[k] = (float)v->force_N[k];
+        pose.torque_N_m[k] = (float)v->torque_N_m[k];
     }
     pal_err err;
     if (n->lcm) {
@@ -228,21 +238,23 @@ static void net_send_config(pal_bridge_net *n)
                                       .version = PAL_LCM_VERSION,
                                       .tool = (int16_t)n->o.tool,
                                       .dof = (int16_t)(s->info.dof_in * 16 + s->info.dof_out),
-                                      .flags = s->pose_only ? 1 : 0,
+                                      .flags = (s->pose_only ? 1 : 0) | (s->leak_W > 0 ? 0 : 4),
                                       .device = name,
                                       .f_peak = (float)s->info.peak_N,
                                       .f_cont = (float)s->info.continuous_N,
                                       .f_user = (float)s->force_cap_N,
                                       .k_max = (float)s->info.stiffness_max_N_m,
                                       .b_max = (float)s->info.damping_max_Ns_m,
-                                      .quat = {1, 0, 0, 0},
                                       .scale = (float)s->scale,
-                                      .fscale = (float)s->force_scale};
+                                      .fscale = (float)s->force_scale,
+                                      .tank_mJ = (float)(1e3 * TANK_MAX_J),
+                                      .leak_mW = (float)(1e3 * s->leak_W)};
     for (int k = 0; k < 3; k++) {
         config.ws_min[k] = (float)s->info.low_m[k];
         config.ws_max[k] = (float)s->info.high_m[k];
-        config.origin[k] = s->origin_m[k];
+        config.origin[k] = n->frame.origin_m[k];
     }
+    pal_workspace_quat(n->frame.rotation, config.quat);
     net_publish(n, "HCONFIG", palpate_haptic_config_t_get_type_info(), &config);
 }
 
@@ -279,6 +291,9 @@ static void net_send_status(void *user)
         .force_rms_N = (float)v->force_rms_N,
         .force_max_N = (float)v->force_max_N,
         .sat_frac = (float)((double)v->n_saturated / ticks),
+        .pc_frac = (float)((double)v->n_passivity / ticks),
+        .tank_mJ = (float)v->tank_mJ,
+        .injected_mJ = (float)v->generated_mJ,
         .stiff_clamped = (float)((double)v->n_clamped / ticks),
         .motor_temp = (float)v->motor_temperature,
         .device = name};
@@ -318,7 +333,10 @@ pal_err pal_bridge_net_open(pal_link_loop *loop, pal_servo *servo, pal_servo_thr
     if (!n->o.servo.clock) n->o.servo.clock = &pal_clock_monotonic;
     n->count.tool = PAL_WIRE_TOOL_NONE;
     const bool bus = !strncmp(options->server, "lcm://", 6) || !strncmp(options->server, "udpm://", 7);
-    n->placed = bus || options->has_origin;
+    n->has_up = pal_unit3(n->up, options->up, 1e-9);
+    if (!n->has_up) pal_set3(n->up, 0, 0, 1);
+    /* the bus has no hello */
+    if (bus) net_place(n);
     if (bus && n->o.tool < 0) n->o.tool = 0;
     if (bus) n->count.tool = n->o.tool;
     pal_err err = bus ? net_open_lcm(n, diag) : net_open_ws(n, diag);

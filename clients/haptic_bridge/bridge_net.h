@@ -12,7 +12,7 @@ typedef struct pal_bridge_net_options {
     const char *session;     /* LCM: session name in the channels; borrowed */
     const char *name;        /* of the member; borrowed                                 */
     int tool;                /* index; with a websocket also PAL_WIRE_TOOL_ANY */
-    double up[3];            /* direction from which the tool touches the organ */
+    double up[3];            /* world direction of the device's up; 0 0 0: that of the scene, from hello */
     bool has_origin;         /* the workspace stays at the origin in servo */
     pal_servo_options servo; /* limits and workspace, for HCONFIG                       */
 } pal_bridge_net_options;
@@ -25,8 +25,9 @@ typedef struct pal_bridge_net_counts {
     char reason[128];
 } pal_bridge_net_counts;
 
-/* Borrows loop, servo and thread (NULL: no timing). With a websocket and no origin, the centre of the workspace is
- * placed where the tool first touches the organ from `up`. REFUSED: URL; *out is then set too and must be closed. */
+/* Borrows loop, servo and thread (NULL: no timing). With a websocket, the device's up becomes the scene's unless `up`
+ * is given, and without an origin the centre of the workspace is placed where the tool first touches the organ from
+ * there. REFUSED: URL; *out is then set too and must be closed. */
 pal_err pal_bridge_net_open(pal_link_loop *loop, pal_servo *servo, pal_servo_thread *thread,
                             const pal_bridge_net_options *options, pal_diagnostic *diag, pal_bridge_net **out);
 void pal_bridge_net_close(pal_bridge_net *net); /* after the loop is destroyed; NULL is fine */

@@ -45,8 +45,16 @@ static const virtual_hand virtual_hands[] = {
     {"off", 0, 0, 0, 0, 0},
 };
 
-typedef enum virtual_script { STILL, PRESS_HOLD, CYCLE, RAMP, STROKE, TAP, SCRIPT_COUNT } virtual_script;
-static const char *const virtual_scripts[] = {"still", "press-hold", "cycle", "ramp", "stroke", "tap"};
+typedef enum virtual_script { STILL, PRESS_HOLD, CYCLE, RAMP, STROKE, TAP, GRASP, SCRIPT_COUNT } virtual_script;
+static const char *const virtual_scripts[] = {"still", "press-hold", "cycle", "ramp", "stroke", "tap", "grasp"};
+
+/* the script grasp: height that the hand intends at the end of each phase, and the phase's length */
+static const struct {
+    double up_m, seconds;
+} virtual_grasp[] = {
+    [PAL_VIRTUAL_TOUCH] = {0, 0.5},     [PAL_VIRTUAL_CLOSED] = {0, 0.5},      [PAL_VIRTUAL_PULL] = {0.03, 2},
+    [PAL_VIRTUAL_SETTLE] = {0.03, 0.5}, [PAL_VIRTUAL_HOLD] = {0.03, 1.5},     [PAL_VIRTUAL_BACK] = {0, 2},
+    [PAL_VIRTUAL_OPEN] = {0.02, 1},     [PAL_VIRTUAL_DONE] = {0.02, INFINITY}};
 
 typedef struct virtual_state {
     const virtual_device *device;
@@ -65,8 +73,25 @@ typedef struct virtual_state {
     uint64_t last_ns;
     double x[3], v[3], xh[3], vh[3], xd[3], applied[3];
     double command[3], next[3], push[3];
+    uint32_t buttons;
+    double quat[4];
+    atomic_int phase; /* pal_virtual_phase */
     atomic_bool stopped, enabled;
 } virtual_state;
+
+/* height of the hand in the script grasp, at a constant speed in each phase */
+static double virtual_grasp_up(virtual_state *s, double t)
+{
+    int phase = PAL_VIRTUAL_TOUCH;
+    double from = 0;
+    while (t >= virtual_grasp[phase].seconds) {
+        from = virtual_grasp[phase].up_m;
+        t -= virtual_grasp[phase++].seconds;
+    }
+    atomic_store(&s->phase, phase);
+    const double seconds = virtual_grasp[phase].seconds, to = virtual_grasp[phase].up_m;
+    return isfinite(seconds) ? from + (to - from) * t / seconds : to;
+}
 
 /* intended position of the hand: z by the script's phase, y for a stroke */
 static void virtual_intend(virtual_state *s)
@@ -93,6 +118,7 @@ static void virtual_intend(virtual_state *s)
         const double phase = fmod(t, 1.0), leg = s->depth_m / 0.3;
         down = phase < leg ? 0.3 * phase : fmax(s->depth_m - 0.3 * (phase - leg), -s->depth_m);
     }
+    if (s->script == GRASP) down = -virtual_grasp_up(s, t);
     if (s->script == STROKE && t > 0.5) s->xd[1] = 0.02 * sin(3.14159265358979 * (t - 0.5));
     s->xd[2] = s->touched_z - down;
 }
@@ -226,6 +252,8 @@ static int virtual_open(void **handle, const char *id, pal_dev_info *out)
         return -2;
     }
     const virtual_device *d = s->device;
+    s->buttons = PAL_DEVICE_BUTTON_DEADMAN;
+    s->quat[0] = 1;
     s->viscous = VISCOUS_NS_M;
     s->coulomb = d->coulomb_N;
     s->x[2] = s->xh[2] = s->xd[2] = s->height_m;
@@ -253,7 +281,10 @@ static int virtual_read(void *handle, pal_dev_state *state)
         pal_virtual_advance(s, fmin((double)(now - s->last_ns) * 1e-9, CATCH_UP_MAX_S));
         s->last_ns = now;
     }
-    *state = (pal_dev_state){.size = sizeof *state, .buttons = PAL_DEVICE_BUTTON_DEADMAN, .quat = {1, 0, 0, 0}};
+    *state = (pal_dev_state){.size = sizeof *state, .buttons = s->buttons};
+    const int phase = atomic_load(&s->phase);
+    if (phase >= PAL_VIRTUAL_CLOSED && phase <= PAL_VIRTUAL_BACK) state->buttons |= PAL_DEVICE_BUTTON_GRASP;
+    memcpy(state->quat, s->quat, sizeof s->quat);
     const double q = s->device->step_m;
     for (int k = 0; k < 3; k++) state->position_m[k] = floor(s->x[k] / q) * q;
     state->stamp_us = (uint64_t)(s->time_s * 1e6);
@@ -316,6 +347,18 @@ void pal_virtual_truth(void *handle, double position_m[3], double velocity_m_s[3
     if (position_m) pal_copy3(position_m, s->x);
     if (velocity_m_s) pal_copy3(velocity_m_s, s->v);
     if (force_N) pal_copy3(force_N, s->applied);
+}
+
+pal_virtual_phase pal_virtual_script_phase(void *handle)
+{
+    return (pal_virtual_phase)atomic_load(&((virtual_state *)handle)->phase);
+}
+
+void pal_virtual_set_handle(void *handle, uint32_t buttons, const double quat[4])
+{
+    virtual_state *s = handle;
+    s->buttons = buttons;
+    memcpy(s->quat, quat, sizeof s->quat);
 }
 
 void pal_virtual_push(void *handle, const double force_N[3])

@@ -19,7 +19,7 @@
 
 typedef struct bridge {
     const char *device, *tool, *hand, *script, *options;
-    double seconds;
+    double seconds, leak_mW;
     bool list, doctor, stdin_stop;
     pal_flag_common common;
     pal_bridge_net_options net_options; /* the servo's among them */
@@ -30,6 +30,8 @@ typedef struct bridge {
     char rt_refused[160];
     const char *until_text;
     pal_end_condition until;
+    int n_held; /* samples of the script grasp while it holds, and sums of what device and tissue gave */
+    double rendered_N, reference_N;
 } bridge;
 
 /* what --until may wait for, in the order of main_watch */
@@ -44,10 +46,25 @@ static void main_on_signal(int number)
     if (number == SIGUSR2 && main_servo) pal_servo_rearm(main_servo);
 }
 
+/* the script grasp: what is rendered and what the tissue gives while the hand holds; ends the program when it is done
+ */
+static void main_watch_grasp(bridge *b, const pal_servo_view *v)
+{
+    const pal_servo_options *o = &b->net_options.servo;
+    if (o->backend != pal_device_virtual()) return;
+    const pal_virtual_phase phase = pal_virtual_script_phase(o->device);
+    if (phase == PAL_VIRTUAL_DONE) pal_link_stop(b->loop);
+    if (phase != PAL_VIRTUAL_HOLD) return;
+    b->n_held++;
+    b->rendered_N += pal_norm3(v->force_N) / o->force_scale;
+    b->reference_N += pal_norm3(v->reference_N);
+}
+
 static void main_watch(void *user)
 {
     bridge *b = user;
     const pal_servo_view *v = pal_bridge_net_view(b->net);
+    main_watch_grasp(b, v);
     const double seen[] = {(double)v->n_model, (double)pal_bridge_net_count(b->net).n_pose, v->force_max_N,
                            (double)v->n_stale, v->state == PAL_SERVO_FREE};
     if (pal_end_condition_met(&b->until, seen)) pal_link_stop(b->loop);
@@ -90,21 +107,17 @@ static pal_err main_open_device(bridge *b, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
-/* axes of the device (x to the user, y right, z up) to the world: z to up */
+/* place and axes of the workspace, as far as they are known before hello */
 static pal_err main_workspace(bridge *b, pal_diagnostic *diag)
 {
     pal_bridge_net_options *net = &b->net_options;
-    pal_servo_options *o = &net->servo;
-    double ex[3], ey[3];
-    if (!pal_unit3(net->up, net->up, 1e-9)) return PAL_REFUSE(diag, "--up is no direction");
-    const double other[3] = {fabs(net->up[0]) < 0.9, fabs(net->up[0]) >= 0.9, 0};
-    pal_cross3(ey, net->up, other);
-    pal_unit3(ey, ey, 1e-9);
-    pal_cross3(ex, ey, net->up);
-    for (int k = 0; k < 3; k++)
-        o->rotation[3 * k] = ex[k], o->rotation[3 * k + 1] = ey[k], o->rotation[3 * k + 2] = net->up[k];
-    net->has_origin = !isnan(o->origin_m[0]);
-    if (!net->has_origin) pal_set3(o->origin_m, 0, 0, 0);
+    const double up[3] = {0, 0, 1};
+    const bool has_up = !isnan(net->up[0]);
+    if (!has_up) pal_set3(net->up, 0, 0, 0);
+    if (has_up && !pal_unit3(net->up, net->up, 1e-9)) return PAL_REFUSE(diag, "--up is no direction");
+    pal_workspace_rotation(has_up ? net->up : up, net->servo.rotation);
+    net->has_origin = !isnan(net->servo.origin_m[0]);
+    if (!net->has_origin) pal_set3(net->servo.origin_m, 0, 0, 0);
     return PAL_ERR_OK;
 }
 
@@ -113,6 +126,14 @@ static cJSON *times_json(const pal_jitter *j)
     return PAL_JSON({"n", JSON_NUMBER(j->n)}, {"p50", JSON_NUMBER(pal_jitter_at_us(j, 0.5))},
                     {"p99", JSON_NUMBER(pal_jitter_at_us(j, 0.99))}, {"p99_9", JSON_NUMBER(pal_jitter_at_us(j, 0.999))},
                     {"max", JSON_NUMBER((double)j->max_ns * 1e-3)});
+}
+
+/* means while the script grasp holds; NULL: it did not get so far */
+static cJSON *grasp_json(const bridge *b)
+{
+    if (b->n_held == 0) return NULL;
+    return PAL_JSON({"felt_N", JSON_NUMBER(b->rendered_N / b->n_held)},
+                    {"server_N", JSON_NUMBER(b->reference_N / b->n_held)});
 }
 
 static void main_json(const bridge *b, const pal_servo_timing *t, const pal_servo_view *v,
@@ -131,6 +152,8 @@ static void main_json(const bridge *b, const pal_servo_timing *t, const pal_serv
         {"lateness_us", times_json(&t->lateness)}, {"rtt_us", times_json(&c->rtt)},
         {"state", JSON_TEXT(pal_servo_state_name(v->state))}, {"force_max_N", JSON_NUMBER(v->force_max_N)},
         {"force_rms_N", JSON_NUMBER(v->force_rms_N)}, {"jump_max_N", JSON_NUMBER(v->jump_max_N)},
+        {"max_step_N", JSON_NUMBER(v->jump_max_N)}, {"generated_mJ", JSON_NUMBER(v->generated_mJ)},
+        {"tank_mJ", JSON_NUMBER(v->tank_mJ)}, {"grasp", grasp_json(b)},
         {"felt_N_m", JSON_NUMBER(v->rendered_stiffness_N_m)}, {"models", JSON_NUMBER(v->n_model)},
         {"models_old", JSON_NUMBER(v->n_model_old)}, {"stale", JSON_NUMBER(v->n_stale)},
         {"faults", JSON_NUMBER(v->n_fault)}, {"not_finite", JSON_NUMBER(v->n_not_finite)},
@@ -151,6 +174,9 @@ static void main_table(const bridge *b, const pal_servo_timing *t, const pal_ser
     for (int i = 0; i < 3; i++)
         printf("%-10s us: p50 %.0f  p99 %.0f  p99.9 %.0f  max %.0f\n", name[i], pal_jitter_at_us(row[i], 0.5),
                pal_jitter_at_us(row[i], 0.99), pal_jitter_at_us(row[i], 0.999), (double)row[i]->max_ns * 1e-3);
+    printf("generated %.3f mJ, tank %.3f mJ\n", v->generated_mJ, v->tank_mJ);
+    if (b->n_held > 0)
+        printf("grasp held: felt %.3f N, tissue %.3f N\n", b->rendered_N / b->n_held, b->reference_N / b->n_held);
     printf(
         "state %s; force N: max %.2f  rms %.2f  largest step at an update %.3f; felt %.0f N/m; %llu models, %llu times "
         "stale\n",
@@ -166,6 +192,7 @@ static pal_err main_start(bridge *b, pal_diagnostic *diag)
     PAL_TRY(main_open_device(b, diag));
     o->force_cap_N = fmin(o->force_cap_N, o->info.peak_N);
     o->pose_only = o->pose_only || o->info.pose_only;
+    o->leak_W = 1e-3 * b->leak_mW;
     o->hand_off = !strcmp(b->hand, "off");
     o->clock = o->backend == pal_device_virtual() ? pal_virtual_clock(o->device) : NULL;
     o->no_watchdog = o->clock != NULL;
@@ -264,7 +291,7 @@ int main(int argc, char **argv)
         .net_options = {.server = "ws://127.0.0.1:8090/ws",
                         .session = "main",
                         .name = "haptic bridge",
-                        .up = {0, 0, 1},
+                        .up = {NAN},
                         .servo = {.rate_hz = 1000, .force_cap_N = 3, .scale = 1, .force_scale = 1, .origin_m = {NAN}}}};
     pal_bridge_net_options *net = &b.net_options;
     pal_servo_options *servo = &net->servo;
@@ -277,7 +304,7 @@ int main(int argc, char **argv)
         {"--tool", "N", PAL_FLAG_TEXT, &b.tool, 0, 0, "tool to take: index or any; LCM: index (any, 0)"},
         {"--hand", "NAME", PAL_FLAG_TEXT, &b.hand, 0, 0, "virtual: average | light | firm | off"},
         {"--script", "NAME", PAL_FLAG_TEXT, &b.script, 0, 0,
-         "virtual: still | press-hold | cycle | ramp | stroke | tap"},
+         "virtual: still | press-hold | cycle | ramp | stroke | tap | grasp (ends by itself)"},
         {"--options", "K=V,...", PAL_FLAG_TEXT, &b.options, 0, 0, "virtual: depth, height mm, wait s, lag ms, clock"},
         {"--rate", "HZ", PAL_FLAG_NUMBER, &servo->rate_hz, 500, 4000, "servo rate (1000)"},
         {"--seconds", "S", PAL_FLAG_NUMBER, &b.seconds, 0.1, 86400, "end after this time (never)"},
@@ -285,9 +312,13 @@ int main(int argc, char **argv)
          "end before that once all is reached: models, poses, force_N, stale, free=1"},
         {"--force-cap", "N", PAL_FLAG_NUMBER, &servo->force_cap_N, 0, 20, "largest force (3, and the device's peak)"},
         {"--origin", "X,Y,Z", PAL_FLAG_VECTOR, servo->origin_m, 0, 0, "world place of the workspace's centre, m"},
-        {"--up", "X,Y,Z", PAL_FLAG_VECTOR, net->up, 0, 0, "world direction of the device's up (0,0,1)"},
+        {"--up", "X,Y,Z", PAL_FLAG_VECTOR, net->up, 0, 0,
+         "world direction of the device's up; its x, to the user, and y, right, are level (up of the scene; LCM: "
+         "0,0,1)"},
         {"--scale", "S", PAL_FLAG_NUMBER, &servo->scale, 0.01, 100, "world metres per device metre (1)"},
         {"--force-scale", "S", PAL_FLAG_NUMBER, &servo->force_scale, 0.01, 100, "device newtons per world newton (1)"},
+        {"--leak-mW", "MW", PAL_FLAG_NUMBER, &b.leak_mW, 0, 10,
+         "energy that changes of the model may add beyond the tank (0, strict)"},
         {"--pose-only", NULL, PAL_FLAG_SWITCH, &servo->pose_only, 0, 0, "no force"},
         {"--stdin-stop", NULL, PAL_FLAG_SWITCH, &b.stdin_stop, 0, 0, "closed standard input is an emergency stop"},
         {"--list-devices", NULL, PAL_FLAG_SWITCH, &b.list, 0, 0, "which back ends there are, or why not"},

@@ -1,5 +1,7 @@
 #include "clients/haptic_bridge/servo.h"
+#include "clients/haptic_bridge/energy_gate.h"
 #include "clients/haptic_bridge/local_contact.h"
+#include "clients/haptic_bridge/tuning.h"
 #include "server/base/command_queue.h"
 #include "server/base/triple_buffer.h"
 #include "server/base/vec3.h"
@@ -7,26 +9,6 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define VELOCITY_CUT_HZ    80.0
-#define USER_CAP_N         3.0
-#define STALE_MIN_S        0.1
-#define STALE_MAX_S        0.5
-#define FADE_OUT_S         0.5
-#define FADE_IN_S          0.25
-#define FADE_START_S       1.0
-#define CLUTCH_FADE_S      0.05
-#define ARM_REST_S         0.5
-#define ARM_SPEED_M_S      0.05
-#define RISE_TIME_S        0.01
-#define STALE_DAMPING_NS_M 3.0
-#define FREE_DAMPING_NS_M  0.5
-#define WALL_STIFFNESS_N_M 200.0
-#define WALL_FRACTION      0.95
-#define DRIVEN_SPEED_M_S   0.5
-#define SPEED_MAX_M_S      2.0
-#define DEGRADED_K_N_M     300.0
-#define BAD_READS_MAX      2
 
 enum { SERVO_GAPS = 64, SERVO_EVENTS = 64 };
 
@@ -37,29 +19,42 @@ typedef struct servo_model {
     pal_wire_haptic haptic;
 } servo_model;
 
+/* what of model and walls is rendered: everything whose change the energy gate pays for */
+typedef struct servo_use {
+    double lambda, age_s;     /* share of the newest model, extrapolation of its surfaces */
+    double gain, wall_gain;   /* of model and walls, 0 to 1 */
+    double stiffness_max_N_m; /* world */
+} servo_use;
+
 struct pal_servo {
     pal_servo_options o;
     double cap_N;
-    pal_triple_buffer models, views, origins;
+    pal_triple_buffer models, views, frames;
     servo_model model_slot[3];
     pal_servo_view view_slot[3];
-    double origin_slot[3][3]; /* m */
+    pal_workspace_frame frame_slot[3];
     pal_command_queue *events;
     atomic_bool estop, rearm, stalled;
     _Atomic uint64_t ticks;
     /* the rest belongs to [servo] */
-    servo_model model; /* in use; empty: none */
+    servo_model model; /* the newest; empty: none */
     uint64_t last_ns, rest_ns;
     double gap_s[SERVO_GAPS];
     int n_gap;
-    bool first, has_position, estop_latched, lost, stale, was_stale, clutched, at_wall;
+    bool first, estop_latched, lost, stale, was_stale, at_wall;
+    const pal_workspace_frame *next_frame; /* waits until it may be applied */
     int degraded, bad_reads;
-    double x[3], v[3], centre[3], frozen_x[3]; /* world pose, clutch centre in the device's frame */
+    pal_workspace place;
+    double blend_s; /* of the newest model */
     double fade, fade_rate, clutch_fade, scale_down, mean_square;
-    double force_prev[3], patch_prev[3];
-    bool model_changed;
+    double force_prev[3], torque_prev[3]; /* commanded in the last tick, device axes */
+    /* force and torque that the motors are driven to and that they are taken to give, device axes */
+    double motor_to[2][3], motor[2][3];
     pal_dev_state device;
+    pal_local_blend blend;
     pal_local_contact_state memory;
+    servo_use use;
+    pal_energy_gate gate;
     pal_servo_view view;
 };
 
@@ -84,10 +79,16 @@ pal_err pal_servo_create(const pal_servo_options *options, pal_servo **out)
     }
     pal_triple_buffer_init(&s->models, &s->model_slot[0], &s->model_slot[1], &s->model_slot[2]);
     pal_triple_buffer_init(&s->views, &s->view_slot[0], &s->view_slot[1], &s->view_slot[2]);
-    pal_triple_buffer_init(&s->origins, s->origin_slot[0], s->origin_slot[1], s->origin_slot[2]);
+    pal_triple_buffer_init(&s->frames, &s->frame_slot[0], &s->frame_slot[1], &s->frame_slot[2]);
+    s->place.frame.scale = s->o.scale;
+    pal_copy3(s->place.frame.origin_m, s->o.origin_m);
+    memcpy(s->place.frame.rotation, s->o.rotation, sizeof s->o.rotation);
+    pal_workspace_restart(&s->place);
+    s->gate = (pal_energy_gate){.max_J = TANK_MAX_J, .leak_W = options->leak_W, .tank_J = TANK_START_J};
     s->model.empty = true;
     s->first = true;
     s->clutch_fade = s->scale_down = 1;
+    s->blend_s = BLEND_MIN_S;
     s->view.state = options->pose_only ? PAL_SERVO_FREE : PAL_SERVO_ARMING;
     *out = s;
     return PAL_ERR_OK;
@@ -118,10 +119,10 @@ void pal_servo_put_generation(pal_servo *servo, uint32_t generation)
     pal_triple_buffer_publish(&servo->models);
 }
 
-void pal_servo_put_origin(pal_servo *servo, const double origin_m[3])
+void pal_servo_put_frame(pal_servo *servo, const pal_workspace_frame *frame)
 {
-    pal_copy3(pal_triple_buffer_slot(&servo->origins), origin_m);
-    pal_triple_buffer_publish(&servo->origins);
+    *(pal_workspace_frame *)pal_triple_buffer_slot(&servo->frames) = *frame;
+    pal_triple_buffer_publish(&servo->frames);
 }
 
 void pal_servo_estop(pal_servo *servo)
@@ -165,11 +166,56 @@ void pal_servo_set_degraded(pal_servo *servo, int level)
                                          : "servo loop is late: forces off"));
 }
 
+/* device joules for each world joule */
+static double servo_energy_scale(const pal_servo *s)
+{
+    return s->o.force_scale / s->place.frame.scale;
+}
+
+static pal_local_limits servo_limits(const pal_servo *s, double stiffness_max_N_m)
+{
+    return (pal_local_limits){.stiffness_max_N_m = stiffness_max_N_m,
+                              .damping_max_Ns_m =
+                                  s->o.info.damping_max_Ns_m / (s->place.frame.scale * s->o.force_scale),
+                              .damping_floor_s = s->o.hand_off ? DAMPING_FLOOR_HAND_OFF_S : DAMPING_FLOOR_S,
+                              .force_max_N = s->cap_N / s->o.force_scale};
+}
+
+/* energy at the device's pose if `use` were rendered, J at the device */
+static double servo_stored(const pal_servo *s, const servo_use *use)
+{
+    double energy = 0, wall_N[3], wall_J;
+    if (use->gain > 0) {
+        const pal_local_limits limits = servo_limits(s, use->stiffness_max_N_m);
+        pal_local_model mix;
+        pal_local_blend_mix(&s->blend, use->lambda, use->age_s, &mix);
+        energy = use->gain * servo_energy_scale(s) * pal_local_contact_energy(&mix, s->place.x_w, &limits, &s->memory);
+    }
+    if (pal_workspace_walls(&s->place, &s->o.info, 0, wall_N, &wall_J)) energy += use->wall_gain * wall_J;
+    return energy;
+}
+
+/* nothing is rendered any more; what was stored is lost */
+static void servo_release(pal_servo *s)
+{
+    s->use.gain = s->use.wall_gain = 0;
+    s->memory.n_group = 0;
+    pal_energy_gate_drop(&s->gate, 0);
+}
+
+static void servo_forget_model(pal_servo *s)
+{
+    s->model.empty = true;
+    s->blend.from = s->blend.to = (pal_local_model){0};
+    servo_release(s);
+}
+
 static void servo_to_arming(pal_servo *s)
 {
     s->view.state = PAL_SERVO_ARMING;
     s->rest_ns = 0;
     s->fade = 0;
+    servo_release(s);
 }
 
 static void servo_fault(pal_servo *s, pal_servo_event_kind kind, double value, const char *text)
@@ -179,67 +225,93 @@ static void servo_fault(pal_servo *s, pal_servo_event_kind kind, double value, c
     servo_to_arming(s);
 }
 
-/* device pose to world; velocity by a one-pole filter on its difference. false: the device gave nothing usable */
+/* another place of the workspace, once it is allowed */
+static void servo_move_frame(pal_servo *s)
+{
+    const pal_workspace_frame *fresh = pal_triple_buffer_take(&s->frames);
+    if (fresh) s->next_frame = fresh;
+    if (!s->next_frame || pal_norm3(s->force_prev) > NO_FORCE_N) return;
+    if (fabs(s->next_frame->scale - s->place.frame.scale) > 0 && !s->place.clutched &&
+        s->view.state != PAL_SERVO_ARMING)
+        return;
+    s->place.frame = *s->next_frame;
+    s->next_frame = NULL;
+    servo_release(s);
+    pal_workspace_restart(&s->place);
+}
+
+/* Work of the hand on the device since the last pose. The motors follow a command one tick and MOTOR_TIME_S late: a
+ * spring gives energy by that, which the damping floor takes and the tank must not count as income */
+static double servo_work(pal_servo *s, double dt)
+{
+    const double left = exp(-dt / MOTOR_TIME_S), mean = (1 - left) * MOTOR_TIME_S / dt;
+    const double *moved[2] = {s->place.step_d, s->place.turn_d}, *next[2] = {s->force_prev, s->torque_prev};
+    double work = 0;
+    for (int i = 0; i < 2; i++)
+        for (int k = 0; k < 3; k++) {
+            const double to = s->motor_to[i][k], off = s->motor[i][k] - to;
+            work -= (to + mean * off) * moved[i][k];
+            s->motor[i][k] = to + left * off;
+            s->motor_to[i][k] = next[i][k];
+        }
+    return work;
+}
+
+/* pose of the device and the hand's work since the last one; false: the device gave nothing usable */
 static bool servo_read(pal_servo *s, double dt)
 {
-    const double *r = s->o.rotation;
     pal_dev_state state;
     if (s->o.backend->read(s->o.device, &state) < 0 || !pal_finite3(state.position_m)) return false;
-    if (!s->clutched) pal_copy3(s->frozen_x, s->x);
-    const bool clutch = (state.buttons & PAL_DEVICE_BUTTON_CLUTCH) != 0;
-    double away[3], x[3], step[3];
-    if (clutch && !s->clutched && pal_norm3(s->force_prev) < 0.3) {
-        s->clutched = true;
-        servo_event(s, PAL_EVENT_CLUTCH, 1, 0, "clutch held");
-    }
-    pal_sub3(away, state.position_m, s->centre);
-    pal_mul33(x, r, away);
-    for (int k = 0; k < 3; k++) x[k] = s->o.origin_m[k] + s->o.scale * x[k];
-    if (s->clutched) {
-        /* the world pose is constant: the centre follows the handle */
-        double back[3];
-        pal_sub3(back, s->frozen_x, s->o.origin_m);
-        pal_tmul33(back, r, back);
-        for (int k = 0; k < 3; k++) s->centre[k] = state.position_m[k] - back[k] / s->o.scale;
-        pal_copy3(x, s->frozen_x);
-        if (!clutch) {
-            s->clutched = false;
-            servo_event(s, PAL_EVENT_CLUTCH, 0, 0, "clutch released");
-        }
-    }
-    if (!s->has_position) pal_copy3(s->x, x);
-    s->has_position = true;
-    pal_sub3(step, x, s->x);
-    const double share = 1 - exp(-2 * 3.14159265358979 * VELOCITY_CUT_HZ * dt);
-    for (int k = 0; k < 3; k++) s->v[k] += share * (step[k] / dt - s->v[k]);
-    pal_copy3(s->x, x);
+    servo_move_frame(s);
+    const bool button = (state.buttons & PAL_DEVICE_BUTTON_CLUTCH) != 0, was = s->place.clutched;
+    const bool hold = button && (was || pal_norm3(s->force_prev) < CLUTCH_FORCE_N);
+    pal_workspace_move(&s->place, &state, hold, dt);
+    if (hold != was) servo_event(s, PAL_EVENT_CLUTCH, hold, 0, hold ? "clutch held" : "clutch released");
     s->device = state;
+    const double work = servo_work(s, dt);
+    if (s->o.info.dof_out > 3 && !hold) {
+        double turn[3];
+        pal_workspace_to_world(&s->place, s->place.turn_d, turn);
+        pal_local_contact_turn(&s->memory, turn);
+    }
+    pal_energy_gate_work(&s->gate, work, servo_stored(s, &s->use));
     return true;
 }
 
-/* newest model of the newest generation, seq growing; older ones are dropped */
+/* the newest model of the newest generation, seq growing; older ones are dropped */
 static void servo_take_model(pal_servo *s)
 {
     const servo_model *fresh = pal_triple_buffer_take(&s->models);
-    s->model_changed = false;
     if (!fresh) return;
     const bool other = fresh->generation != s->model.generation;
-    /* another session: force fades in from zero */
-    if (other) s->fade = 0;
-    if (fresh->empty) {
+    if (other) {
+        /* another session owes nothing to this one: force fades in from zero, with an empty tank */
+        if (s->model.generation != 0) s->gate.tank_J = fmin(s->gate.tank_J, 0);
+        s->fade = 0;
+        servo_forget_model(s);
         s->model.generation = fresh->generation;
-        s->model.empty = true;
-        s->model_changed = true;
-        return;
     }
-    if (!other && !s->model.empty && (int32_t)(fresh->haptic.seq - s->model.haptic.seq) <= 0) {
+    if (fresh->empty) return;
+    if (!s->model.empty && (int32_t)(fresh->haptic.seq - s->model.haptic.seq) <= 0) {
         s->view.n_model_old++;
         return;
     }
-    if (!other && !s->model.empty && fresh->arrival_ns > s->model.arrival_ns)
-        s->gap_s[s->n_gap++ % SERVO_GAPS] = (double)(fresh->arrival_ns - s->model.arrival_ns) * 1e-9;
+    double gap = 0;
+    if (!s->model.empty && fresh->arrival_ns > s->model.arrival_ns) {
+        gap = (double)(fresh->arrival_ns - s->model.arrival_ns) * 1e-9;
+        s->gap_s[s->n_gap++ % SERVO_GAPS] = gap;
+    }
+    /* a slow server changes its mind by more at once */
+    s->blend_s = fmin(fmax(BLEND_MIN_S, fmax(gap, 1e-6 * fresh->haptic.frame_us)), BLEND_MAX_S);
+    const pal_local_limits limits = servo_limits(s, s->use.stiffness_max_N_m);
+    if (!pal_local_blend_start(&s->blend, s->use.lambda, s->use.age_s, &fresh->haptic, &limits)) {
+        s->view.n_not_finite++;
+        servo_forget_model(s);
+        servo_fault(s, PAL_EVENT_FAULT, 0, "a number of the model was not finite");
+        return;
+    }
+    s->use.lambda = s->use.age_s = 0;
     s->model = *fresh;
-    s->model_changed = true;
     s->view.n_model++;
     if (fresh->haptic.flags & PAL_WIRE_HAPTIC_FORCE_OFF) atomic_store(&s->estop, true);
 }
@@ -289,7 +361,7 @@ static bool servo_states(pal_servo *s, uint64_t now, double dt)
     }
     if (s->estop_latched || s->lost || s->o.pose_only) return false;
     if (s->view.state == PAL_SERVO_ARMING) {
-        const bool ready = (s->device.buttons & PAL_DEVICE_BUTTON_DEADMAN) && pal_norm3(s->v) < ARM_SPEED_M_S;
+        const bool ready = (s->device.buttons & PAL_DEVICE_BUTTON_DEADMAN) && pal_norm3(s->place.v_d) < ARM_SPEED_M_S;
         if (!ready || s->rest_ns == 0) s->rest_ns = now;
         if ((double)(now - s->rest_ns) * 1e-9 < ARM_REST_S) return false;
         s->view.state = PAL_SERVO_FREE;
@@ -308,110 +380,172 @@ static bool servo_states(pal_servo *s, uint64_t now, double dt)
     servo_toward(&s->fade, s->stale || s->degraded == 2 ? 0 : 1,
                  s->stale || s->degraded == 2 ? dt / FADE_OUT_S : dt * s->fade_rate);
     if (s->fade >= 1) s->fade_rate = 1 / FADE_IN_S;
-    servo_toward(&s->clutch_fade, s->clutched ? 0 : 1, s->clutched ? dt / CLUTCH_FADE_S : dt / FADE_IN_S);
+    const bool held = s->place.clutched;
+    servo_toward(&s->clutch_fade, held ? 0 : 1, held ? dt / CLUTCH_FADE_S : dt / FADE_IN_S);
     return true;
 }
 
-/* patches of the model, or nothing; world frame */
-static void servo_patches(pal_servo *s, uint64_t now, double force[3], pal_local_contact_result *result)
+/* what should be rendered now, changed by no more than a tick's step */
+static servo_use servo_wanted(const pal_servo *s, uint64_t now, double dt)
 {
-    double k_max = s->o.info.stiffness_max_N_m / (s->o.scale * s->o.force_scale);
+    const double gain = s->fade * s->clutch_fade * s->scale_down;
+    double k_max = s->o.info.stiffness_max_N_m;
     if (s->degraded >= 1) k_max = fmin(k_max, DEGRADED_K_N_M);
-    const pal_local_contact_limits limits = {k_max, s->o.info.damping_max_Ns_m, s->o.hand_off ? 5e-3 : 2.5e-3};
-    *result = (pal_local_contact_result){.finite = true};
-    pal_set3(force, 0, 0, 0);
-    if (s->model.empty || s->fade <= 0) return;
-    pal_local_contact_force(&s->model.haptic, servo_model_age_s(s, now), s->x, s->v, &limits, &s->memory, result);
-    pal_scale3(force, s->fade * s->clutch_fade, result->force_N);
-    if (s->model_changed) {
-        const double jump = pal_dist3(force, s->patch_prev);
-        if (s->view.n_model > 1 && jump > s->view.jump_max_N) s->view.jump_max_N = jump;
-    }
+    return (servo_use){.lambda = fmin(1, s->use.lambda + dt / s->blend_s),
+                       .age_s = fmin(servo_model_age_s(s, now), EXTRAPOLATE_MAX_S),
+                       .gain = fmin(gain, s->use.gain + dt * s->fade_rate),
+                       .wall_gain = s->degraded == 2 ? 0 : fmin(s->scale_down, s->use.wall_gain + dt / FADE_START_S),
+                       .stiffness_max_N_m = k_max / (s->place.frame.scale * s->o.force_scale)};
 }
 
-/* soft walls at 95 % of the workspace, device frame */
-static void servo_walls(pal_servo *s, double force_d[3])
+typedef struct servo_change {
+    const pal_servo *servo;
+    servo_use from, to;
+} servo_change;
+
+static servo_use servo_use_between(const servo_change *c, double share)
 {
-    bool at_wall = false;
-    for (int k = 0; k < 3; k++) {
-        const double middle = (s->o.info.low_m[k] + s->o.info.high_m[k]) / 2;
-        const double half = WALL_FRACTION * (s->o.info.high_m[k] - s->o.info.low_m[k]) / 2;
-        const double off = s->device.position_m[k] - middle;
-        if (fabs(off) <= half) continue;
-        force_d[k] -= WALL_STIFFNESS_N_M * (off - copysign(half, off));
-        at_wall = true;
+    const servo_use *a = &c->from, *b = &c->to;
+    return (servo_use){a->lambda + share * (b->lambda - a->lambda), a->age_s + share * (b->age_s - a->age_s),
+                       a->gain + share * (b->gain - a->gain), a->wall_gain + share * (b->wall_gain - a->wall_gain),
+                       a->stiffness_max_N_m + share * (b->stiffness_max_N_m - a->stiffness_max_N_m)};
+}
+
+static double servo_change_stored(const void *user, double share)
+{
+    const servo_change *c = user;
+    const servo_use use = servo_use_between(c, share);
+    return servo_stored(c->servo, &use);
+}
+
+/* force and torque of a use, world; memory moves on */
+static void servo_force(const pal_servo *s, const servo_use *use, double dt, pal_local_contact_state *memory,
+                        pal_local_contact_result *out)
+{
+    const pal_local_limits limits = servo_limits(s, use->stiffness_max_N_m);
+    pal_local_model mix;
+    pal_local_blend_mix(&s->blend, use->lambda, use->age_s, &mix);
+    pal_local_contact_force(&mix, s->place.x_w, s->place.v_w, dt, &limits, memory, out);
+    pal_scale3(out->force_N, use->gain, out->force_N);
+    pal_scale3(out->torque_N_m, use->gain, out->torque_N_m);
+}
+
+/* what the model gives: falls of gain and limits at once, everything else as the energy gate allows */
+static void servo_contact(pal_servo *s, uint64_t now, double dt, pal_local_contact_result *out)
+{
+    servo_change change = {.servo = s, .from = s->use, .to = servo_wanted(s, now, dt)};
+    servo_use *use = &change.from;
+    use->gain = fmin(use->gain, change.to.gain);
+    use->wall_gain = fmin(use->wall_gain, change.to.wall_gain);
+    use->stiffness_max_N_m = fmin(use->stiffness_max_N_m, change.to.stiffness_max_N_m);
+    pal_energy_gate_drop(&s->gate, servo_stored(s, use));
+    pal_local_contact_state memory = s->memory;
+    pal_local_contact_result before;
+    servo_force(s, use, dt, &memory, &before);
+    s->use = servo_use_between(&change, pal_energy_gate_pay(&s->gate, dt, servo_change_stored, &change));
+    servo_force(s, &s->use, dt, &s->memory, out);
+    pal_energy_gate_settle(&s->gate, servo_stored(s, &s->use));
+    const double jump = s->o.force_scale * pal_dist3(before.force_N, out->force_N);
+    if (jump > s->view.jump_max_N) s->view.jump_max_N = jump;
+}
+
+/* a long mean force above the continuous rating scales force down */
+static void servo_rate(pal_servo *s, double dt)
+{
+    const double rating = s->o.info.continuous_N;
+    s->mean_square += (1 - exp(-dt / RATING_TIME_S)) * (pal_dot3(s->force_prev, s->force_prev) - s->mean_square);
+    const bool hot = s->mean_square > rating * rating;
+    servo_toward(&s->scale_down, hot ? 0 : 1, hot ? dt / SCALE_DOWN_S : dt / SCALE_UP_S);
+}
+
+/* cap and rise limit; device axes; true: something was cut */
+static bool servo_cut(const pal_servo *s, double force_d[3], double torque_d[3], double dt)
+{
+    const double size = pal_norm3(force_d);
+    const double max = fmin(s->cap_N, pal_norm3(s->force_prev) + s->cap_N / RISE_TIME_S * dt);
+    if (size > max) {
+        /* slightly less, so that no rounding passes the cap */
+        pal_scale3(torque_d, max / size, torque_d);
+        pal_scale3(force_d, max / size * (1 - 1e-12), force_d);
     }
+    return size > s->cap_N;
+}
+
+/* Damping and walls, device axes */
+static void servo_own_forces(pal_servo *s, double dt, double force_d[3])
+{
+    double wall[3], wall_J, stale = 0;
+    if (s->degraded == 2) return; /* a late loop gives no force at all */
+    if (s->stale) stale = s->fade > 0 ? STALE_DAMPING_NS_M : FREE_DAMPING_NS_M;
+    const double gate = pal_energy_gate_damping(&s->gate, pal_norm3(s->place.v_d), dt);
+    if (gate > 0 && s->gate.tank_J < 0) s->view.n_passivity++;
+    pal_axpy3(force_d, -fmin(s->o.info.damping_max_Ns_m, fmax(stale, gate)), s->place.v_d);
+    const bool at_wall = pal_workspace_walls(&s->place, &s->o.info, DAMPING_FLOOR_S, wall, &wall_J);
+    if (at_wall) pal_axpy3(force_d, s->use.wall_gain, wall);
     if (at_wall && !s->at_wall) servo_event(s, PAL_EVENT_WORKSPACE_EDGE, 0, 0, "edge of the workspace");
     s->at_wall = at_wall;
 }
 
-/* cap, continuous rating, rise limit; device frame; true: something was cut */
-static bool servo_limit(pal_servo *s, double force_d[3], double dt)
+/* everything that gives force; results in device axes, zero after a fault */
+static void servo_render(pal_servo *s, uint64_t now, double dt, double force_d[3], double torque_d[3])
 {
-    bool cut = false;
-    s->mean_square += (1 - exp(-dt)) * (pal_dot3(s->force_prev, s->force_prev) - s->mean_square);
-    const bool hot = s->mean_square > s->o.info.continuous_N * s->o.info.continuous_N;
-    servo_toward(&s->scale_down, hot ? 0 : 1, hot ? dt / 2 : dt / 5);
-    pal_scale3(force_d, s->scale_down, force_d);
-    const double before = pal_norm3(s->force_prev), size = pal_norm3(force_d);
-    double max = s->cap_N;
-    if (size > max) cut = true;
-    max = fmin(max, before + s->cap_N / RISE_TIME_S * dt);
-    /* slightly less, so that no rounding passes the cap */
-    if (size > max) pal_scale3(force_d, max / size * (1 - 1e-12), force_d);
-    return cut;
-}
-
-/* everything that gives force; result in the device's frame */
-static void servo_render(pal_servo *s, uint64_t now, double dt, double force_d[3])
-{
-    pal_local_contact_result patch;
-    double force[3];
-    servo_patches(s, now, force, &patch);
-    pal_copy3(s->patch_prev, force);
-    if (!patch.finite) {
+    pal_local_contact_result contact;
+    servo_rate(s, dt);
+    servo_contact(s, now, dt, &contact);
+    if (!pal_finite3(contact.force_N) || !pal_finite3(contact.torque_N_m)) {
         s->view.n_not_finite++;
+        servo_forget_model(s);
         servo_fault(s, PAL_EVENT_FAULT, 0, "force was not finite");
-        pal_set3(force_d, 0, 0, 0);
         return;
     }
-    const double speed = pal_norm3(s->v);
-    if ((pal_dot3(force, s->v) > 0 && pal_norm3(force) > 0.05 && speed > DRIVEN_SPEED_M_S) || speed > SPEED_MAX_M_S) {
+    double force[3], torque[3];
+    pal_workspace_to_device(&s->place, contact.force_N, force);
+    pal_scale3(force, s->o.force_scale, force);
+    const double speed = pal_norm3(s->place.v_d);
+    const bool driven = pal_dot3(force, s->place.v_d) > 0 && pal_norm3(force) > DRIVEN_FORCE_N;
+    if ((driven && speed > DRIVEN_SPEED_M_S) || speed > SPEED_MAX_M_S) {
         servo_fault(s, PAL_EVENT_LIMIT, speed, "too fast: force off");
-        pal_set3(force_d, 0, 0, 0);
         return;
     }
-    if (s->stale) pal_axpy3(force, -(s->fade > 0 ? STALE_DAMPING_NS_M : FREE_DAMPING_NS_M), s->v);
-    pal_tmul33(force_d, s->o.rotation, force);
-    pal_scale3(force_d, s->o.force_scale, force_d);
-    servo_walls(s, force_d);
-    if (servo_limit(s, force_d, dt)) s->view.n_saturated++, s->view.flags |= PAL_WIRE_POSE_SATURATED;
-    s->view.n_clamped += patch.clamped;
-    if (patch.clamped) s->view.flags |= PAL_WIRE_POSE_STIFF_CLAMPED;
-    if (patch.n_contact > 0) s->view.flags |= PAL_WIRE_POSE_CONTACT;
-    s->view.depth_m = patch.depth_m;
-    s->view.rendered_stiffness_N_m = patch.depth_m > 0 ? pal_norm3(force) / patch.depth_m : 0;
-    s->view.state = s->stale && s->fade > 0 && s->view.n_model > 0
-                        ? PAL_SERVO_STALE
-                        : (patch.n_contact > 0 && s->fade > 0 ? PAL_SERVO_CONTACT : PAL_SERVO_FREE);
+    pal_workspace_to_device(&s->place, contact.torque_N_m, torque);
+    pal_scale3(torque, s->o.info.dof_out > 3 ? servo_energy_scale(s) : 0, torque);
+    pal_copy3(force_d, force);
+    pal_copy3(torque_d, torque);
+    servo_own_forces(s, dt, force_d);
+    pal_servo_view *v = &s->view;
+    if (servo_cut(s, force_d, torque_d, dt) || (contact.saturated && s->use.gain > 0))
+        v->n_saturated++, v->flags |= PAL_WIRE_POSE_SATURATED;
+    v->n_clamped += contact.clamped;
+    if (contact.clamped) v->flags |= PAL_WIRE_POSE_STIFF_CLAMPED;
+    if (contact.n_contact > 0) v->flags |= PAL_WIRE_POSE_CONTACT;
+    v->depth_m = contact.depth_m;
+    v->n_proxy = contact.n_contact;
+    memcpy(v->proxy_m, contact.proxy_m, sizeof v->proxy_m);
+    v->rendered_stiffness_N_m = contact.depth_m > 0 ? pal_norm3(contact.force_N) / contact.depth_m : 0;
+    const bool acts = s->use.gain > 0 && (contact.n_contact > 0 || s->model.haptic.has_grasp);
+    v->state =
+        s->stale && s->fade > 0 && v->n_model > 0 ? PAL_SERVO_STALE : (acts ? PAL_SERVO_CONTACT : PAL_SERVO_FREE);
 }
 
-static void servo_publish(pal_servo *s, uint64_t now, const double force_d[3])
+static void servo_publish(pal_servo *s, uint64_t now)
 {
     pal_servo_view *v = &s->view;
     v->n_tick++;
-    pal_copy3(v->position_m, s->x);
-    pal_copy3(v->velocity_m_s, s->v);
-    memcpy(v->quat, s->device.quat, sizeof v->quat);
-    pal_mul33(v->force_N, s->o.rotation, force_d);
-    v->fade = s->fade;
+    pal_copy3(v->position_m, s->place.x_w);
+    pal_copy3(v->velocity_m_s, s->place.v_w);
+    pal_copy3(v->omega_rad_s, s->place.omega_w);
+    memcpy(v->quat, s->place.quat_w, sizeof v->quat);
+    pal_workspace_to_world(&s->place, s->force_prev, v->force_N);
+    pal_workspace_to_world(&s->place, s->torque_prev, v->torque_N_m);
+    v->fade = s->use.gain;
     v->grip = s->device.grip;
     v->buttons = s->device.buttons & PAL_DEVICE_BUTTON_GRASP ? PAL_WIRE_GRASP : 0;
     v->motor_temperature = s->device.motor_temperature;
-    const double size = pal_norm3(force_d);
+    v->tank_mJ = 1e3 * s->gate.tank_J;
+    v->generated_mJ = 1e3 * s->gate.given_max_J;
     v->force_rms_N = sqrt(s->mean_square);
-    if (size > v->force_max_N) v->force_max_N = size;
-    if (s->clutched) v->flags |= PAL_WIRE_POSE_CLUTCHED;
+    v->force_max_N = fmax(v->force_max_N, pal_norm3(s->force_prev));
+    if (s->place.clutched) v->flags |= PAL_WIRE_POSE_CLUTCHED;
     if (s->stale) v->flags |= PAL_WIRE_POSE_STALE;
     if (s->estop_latched) v->flags |= PAL_WIRE_POSE_ESTOP;
     if (s->o.pose_only) v->flags |= PAL_WIRE_POSE_POSE_ONLY;
@@ -421,10 +555,28 @@ static void servo_publish(pal_servo *s, uint64_t now, const double force_d[3])
     v->model_seq = model ? s->model.haptic.seq : 0;
     v->model_stamp_us = model ? s->model.haptic.stamp_us : 0;
     v->model_age_us = age_us < 4e9 ? (uint32_t)age_us : UINT32_MAX;
+    for (int k = 0; k < 3; k++) v->reference_N[k] = model ? (double)s->model.haptic.f_ref_N[k] : 0;
     pal_servo_view *slot = pal_triple_buffer_slot(&s->views);
     *slot = *v;
     pal_triple_buffer_publish(&s->views);
     atomic_fetch_add(&s->ticks, 1);
+}
+
+/* one bad read keeps the force, more of them are a latched fault */
+static void servo_unread(pal_servo *s, double force_d[3], double torque_d[3])
+{
+    if (s->lost) return;
+    if (++s->bad_reads < BAD_READS_MAX) {
+        pal_copy3(force_d, s->force_prev);
+        pal_copy3(torque_d, s->torque_prev);
+        return;
+    }
+    s->lost = true;
+    s->fade = 0;
+    servo_release(s);
+    s->view.state = PAL_SERVO_FAULT;
+    s->view.n_fault++;
+    servo_event(s, PAL_EVENT_DEVICE_LOST, 0, 0, "device does not answer");
 }
 
 void pal_servo_tick(pal_servo *s, uint64_t now_ns)
@@ -434,39 +586,32 @@ void pal_servo_tick(pal_servo *s, uint64_t now_ns)
     dt = fmin(fmax(dt, 0.1 * nominal), 0.1);
     s->first = false;
     s->last_ns = now_ns;
-    double force_d[3] = {0, 0, 0};
-    const double none[3] = {0, 0, 0};
+    double force_d[3] = {0, 0, 0}, torque_d[3] = {0, 0, 0};
     s->view.flags = 0;
+    s->view.n_proxy = 0;
     s->view.depth_m = s->view.rendered_stiffness_N_m = 0;
     const bool good = !s->lost && servo_read(s, dt);
     servo_take_model(s);
-    if (good) {
+    if (!good) {
+        servo_unread(s, force_d, torque_d);
+    } else {
         s->bad_reads = 0;
-        /* the workspace may move only while no force is rendered */
-        const double *origin = pal_norm3(s->force_prev) < 0.01 ? pal_triple_buffer_take(&s->origins) : NULL;
-        if (origin) {
-            pal_copy3(s->o.origin_m, origin);
-            s->has_position = false;
-        }
-        if (servo_states(s, now_ns, dt)) servo_render(s, now_ns, dt, force_d);
-    } else if (!s->lost) {
-        /* one bad read keeps the force, more of them are a latched fault */
-        pal_copy3(force_d, s->force_prev);
-        if (++s->bad_reads >= BAD_READS_MAX) {
-            s->lost = true;
-            s->fade = 0;
-            s->view.state = PAL_SERVO_FAULT;
-            s->view.n_fault++;
-            servo_event(s, PAL_EVENT_DEVICE_LOST, 0, 0, "device does not answer");
-            pal_set3(force_d, 0, 0, 0);
-        }
+        if (servo_states(s, now_ns, dt))
+            servo_render(s, now_ns, dt, force_d, torque_d);
+        else
+            servo_release(s);
     }
     /* an e-stop that came during the tick counts for this tick */
-    if (atomic_load(&s->estop) || s->estop_latched || !pal_finite3(force_d)) pal_set3(force_d, 0, 0, 0);
+    if (atomic_load(&s->estop) || s->estop_latched || !pal_finite3(force_d)) {
+        pal_set3(force_d, 0, 0, 0);
+        pal_set3(torque_d, 0, 0, 0);
+        servo_release(s);
+    }
     if (s->estop_latched) s->fade = 0;
-    s->o.backend->write(s->o.device, force_d, none, 0);
+    s->o.backend->write(s->o.device, force_d, torque_d, 0);
     pal_copy3(s->force_prev, force_d);
-    servo_publish(s, now_ns, force_d);
+    pal_copy3(s->torque_prev, torque_d);
+    servo_publish(s, now_ns);
 }
 
 void pal_servo_end(pal_servo *servo)

@@ -4,25 +4,30 @@
  * A tick takes no lock, allocates no memory, and does no input or output except the device's. Models arrive and views
  * leave through triple buffers, events through a queue; e-stop and re-arm are atomic flags.
  *
+ * What is rendered is a model (local_model.h, local_contact.h) times a gain. Every change of the two that raises the
+ * stored energy is made as far as the energy tank pays for it (energy_gate.h).
+ *
  * States:
  *   - ARMING lasts until the dead man's switch is held and the handle rests (< 0.05 m/s) for 0.5 s; force then fades in
  *     over 1 s.
  *   - FREE and CONTACT render forces.
  *   - STALE begins when the newest model is older than max(100 ms, 4 frame times, twice the usual longest gap). Force
  *     fades out over 500 ms under 3 N s/m damping; FREE without a model (0.5 N s/m) follows. A new model fades in over
- *     250 ms.
+ *     250 ms or as the tank allows.
  *   - ESTOP and FAULT give no force until re-armed. E-stop is latched. A fault of speed, number or stalled loop re-arms
  *     by the conditions of ARMING; a device that does not answer does not re-arm.
  *
- * Limits: |F| <= cap, rising by at most cap / 10 ms and falling without limit. An rms over 1 s above the device's
- * continuous rating scales force down. Contact stiffness <= device limit / (scale force_scale), 300 N/m without real
- * time. Walls of 200 N/m stand at 95 % of the workspace.
+ * Limits: |F| <= cap, rising by at most cap / 10 ms and falling without limit. An rms over 10 s above the device's
+ * continuous rating scales force down. Stiffness of a contact or a grasp <= device limit / (scale force_scale), 300 N/m
+ * without real time. Walls of 200 N/m stand at 95 % of the workspace.
  *
- * World frame: x_w = origin + scale R (x_d - centre), F_d = force_scale R' F_w. While the clutch button is down, the
- * world pose is constant and force is faded out. */
+ * World frame: workspace.h; F_d = force_scale R' F_w. While the clutch button is down, the world pose is constant and
+ * force is faded out; the clutch engages below 0.3 N only. */
 #ifndef PAL_HAPTIC_BRIDGE_SERVO_H
 #define PAL_HAPTIC_BRIDGE_SERVO_H
 #include "clients/haptic_bridge/device.h"
+#include "clients/haptic_bridge/local_model.h"
+#include "clients/haptic_bridge/workspace.h"
 #include "protocol/wire.h"
 #include "server/base/clock.h"
 #include "server/base/err.h"
@@ -73,6 +78,7 @@ typedef struct pal_servo_options {
     double origin_m[3];        /* world position of the workspace centre */
     double rotation[9];        /* device to world, row-major                                     */
     double scale, force_scale; /* 0: 1                                                           */
+    double leak_W;             /* energy that a change of the model may add without the tank: 0, strict */
     bool pose_only;
     bool hand_off;          /* the hand appears off the handle: damping floor 5 ms instead of 2.5 ms */
     const pal_clock *clock; /* of servo_thread.h, borrowed; NULL: pal_clock_monotonic */
@@ -95,8 +101,9 @@ void pal_servo_end(pal_servo *servo);
 void pal_servo_put_model(pal_servo *servo, const pal_wire_haptic *model, uint32_t generation, uint64_t arrival_ns);
 /* [net] the server is lost or has returned as another session: drops the model at once and fades */
 void pal_servo_put_generation(pal_servo *servo, uint32_t generation);
-/* [net] moves the world position of the workspace centre; applied while there is no force */
-void pal_servo_put_origin(pal_servo *servo, const double origin_m[3]);
+/* [net] another place of the workspace in the world; applied while there is no force, another scale only while the
+ * clutch is held or before forces start */
+void pal_servo_put_frame(pal_servo *servo, const pal_workspace_frame *frame);
 void pal_servo_estop(pal_servo *servo);   /* [any] async-signal-safe; takes effect within one tick */
 void pal_servo_rearm(pal_servo *servo);   /* [any] clears e-stop: ARMING follows                   */
 void pal_servo_stalled(pal_servo *servo); /* [any] the watchdog has stopped the device: ARMING follows */
@@ -105,16 +112,21 @@ void pal_servo_stalled(pal_servo *servo); /* [any] the watchdog has stopped the 
 typedef struct pal_servo_view {
     uint64_t n_tick;
     pal_servo_state state;
-    double position_m[3], quat[4], velocity_m_s[3]; /* world */
-    double force_N[3];                              /* commanded force on the hand, world */
-    double fade, grip;
-    uint32_t flags, buttons; /* PAL_WIRE_POSE_*, PAL_WIRE_GRASP       */
+    double position_m[3], quat[4], velocity_m_s[3], omega_rad_s[3]; /* world */
+    double force_N[3], torque_N_m[3];                               /* commanded, on the hand, world */
+    double reference_N[3];                                          /* f_ref_N of the model in use */
+    int n_proxy;
+    double proxy_m[PAL_LOCAL_PATCH_MAX][3]; /* tool's centre on the surface of each contact, for display */
+    double fade, grip;                      /* fade: gain of the model that is rendered */
+    uint32_t flags, buttons;                /* PAL_WIRE_POSE_*, PAL_WIRE_GRASP       */
     uint32_t model_seq, model_age_us;
     uint64_t model_stamp_us;
     uint64_t n_model, n_model_old, n_saturated, n_clamped, n_stale, n_fault, n_not_finite;
-    double force_rms_N, force_max_N, jump_max_N; /* jump: largest step at a model change */
+    uint64_t n_passivity;                        /* ticks in which the passivity controller damped */
+    double tank_mJ, generated_mJ;                /* generated: the most that the hand has ever got on balance */
+    double force_rms_N, force_max_N, jump_max_N; /* jump: largest force step by a change of model or gain */
     double depth_m, motor_temperature;
-    double rendered_stiffness_N_m; /* norm of the contact force / depth; 0 out of contact */
+    double rendered_stiffness_N_m; /* norm of the rendered force / depth; 0 out of contact */
 } pal_servo_view;
 /* [net] newest unseen view or NULL; valid until the next call */
 const pal_servo_view *pal_servo_take_view(pal_servo *servo);

@@ -45,7 +45,23 @@ check "it ends well" $? == 0
 check "without a server models are stale" "$(sed -n 's/.* \([0-9]*\) times stale/\1/p' "$work/gone")" '>=' 1
 check "and the device is free again" "$(grep -c 'state free;' "$work/gone")" == 1
 
-timeout 20 "$bin/palpate-bridge" --server "$url" --seconds 1 --json >"$work/nobody" 2>"$work/nobody.err"
+# a scene whose up is y, grasped and pulled: the device's up is the scene's, and the hand feels what the tissue gives
+sed 's/"gravity_m_s2": 0,/"gravity_m_s2": 0, "up": [0, 1, 0],/' "$work/ball.json" >"$work/up.json"
+scene=$work/up.json
+start_server --port 0
+timeout 110 "$bin/palpate-bridge" --server "$url" --device "$(device omega3)" --script grasp --seconds 100 --json \
+    >"$work/grasp" 2>"$work/grasp.err"
+check "a bridge that grasps ends by itself" $? == 0
+felt=$(json felt_N "$work/grasp") given=$(json server_N "$work/grasp")
+check "the tissue is pulled" "$given" '>' 0.3
+check "the hand feels it within 5 %" "$(awk -v a="$felt" -v b="$given" 'BEGIN { print (a > b ? a - b : b - a) / b }')" '<' 0.05
+check "no more energy than the tank's" "$(json generated_mJ "$work/grasp")" '<=' 1.01
+place=$(sed -n 's/.*"position_m":\[\([^]]*\)\].*/\1/p' "$work/grasp")
+check "the hand is above the ball along y" "$(echo "$place" | cut -d, -f2)" '>' 0.04
+check "and not along z" "$(echo "$place" | cut -d, -f3)" '<' 0.02
+echo "     grasp held: felt $felt N of $given N, largest step $(json max_step_N "$work/grasp") N"
+
+timeout 20 "$bin/palpate-bridge" --server ws://127.0.0.1:9/ws --seconds 1 --json >"$work/nobody" 2>"$work/nobody.err"
 check "nobody at the address is a failure" $? == 1
 check "said in one line" "$(wc -l <"$work/nobody.err")" == 1
 timeout 20 "$bin/palpate-bridge" --device hdapi:x >/dev/null 2>&1

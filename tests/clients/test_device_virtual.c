@@ -185,6 +185,39 @@ static void damping_on_the_way_is_no_touch(void)
     pal_device_virtual()->close(d);
 }
 
+/* closed from half a second after the touch until the hand is back; 2 s up, 2 s held, 2 s back, away */
+static void grasp_script_closes_pulls_holds_and_lets_go(void)
+{
+    pal_dev_info info;
+    void *d = opened("inverse3,script=grasp,clock=virtual", &info);
+    REQUIRE(d);
+    const double torque[3] = {0, 0, 0};
+    int ticks[PAL_VIRTUAL_DONE + 1] = {0};
+    double x[3], highest = -1, touch = 0;
+    for (int i = 0; i < 12000 && pal_virtual_script_phase(d) != PAL_VIRTUAL_DONE; i++) {
+        pal_dev_state state;
+        pal_device_virtual()->read(d, &state);
+        pal_virtual_truth(d, x, NULL, NULL);
+        const double force[3] = {0, 0, x[2] < 0 ? -300 * x[2] : 0};
+        pal_device_virtual()->write(d, force, torque, 0);
+        const int phase = pal_virtual_script_phase(d);
+        CHECK_INT((state.buttons & PAL_DEVICE_BUTTON_GRASP) != 0,
+                  phase >= PAL_VIRTUAL_CLOSED && phase < PAL_VIRTUAL_OPEN);
+        if (phase == PAL_VIRTUAL_CLOSED) touch = x[2];
+        if (phase == PAL_VIRTUAL_HOLD) highest = x[2];
+        ticks[phase]++;
+        pal_virtual_advance(d, 1e-3);
+    }
+    CHECK_NEAR(ticks[PAL_VIRTUAL_CLOSED], 500, 1);
+    CHECK_NEAR(ticks[PAL_VIRTUAL_PULL], 2000, 1);
+    CHECK_NEAR(ticks[PAL_VIRTUAL_SETTLE] + ticks[PAL_VIRTUAL_HOLD], 2000, 1);
+    CHECK_NEAR(ticks[PAL_VIRTUAL_BACK], 2000, 1);
+    CHECK_INT(pal_virtual_script_phase(d), PAL_VIRTUAL_DONE);
+    /* nothing pulls back: friction, 0.2 N, and the force of the touch take 5 mm of the hand's 30 at most */
+    CHECK_NEAR(highest - touch, 0.03, 0.005);
+    pal_device_virtual()->close(d);
+}
+
 static void refuses_unknown_devices_hands_and_keys(void)
 {
     pal_dev_info info;
@@ -207,6 +240,7 @@ int main(void)
     RUN(stop_takes_the_force_away_at_once);
     RUN(same_calls_give_the_same_numbers);
     RUN(damping_on_the_way_is_no_touch);
+    RUN(grasp_script_closes_pulls_holds_and_lets_go);
     RUN(refuses_unknown_devices_hands_and_keys);
     return check_report();
 }

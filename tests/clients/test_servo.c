@@ -2,6 +2,7 @@
 #include "clients/haptic_bridge/device_virtual.h"
 #include "clients/haptic_bridge/jitter.h"
 #include "clients/haptic_bridge/servo.h"
+#include "server/base/vec3.h"
 #include "tests/check.h"
 
 #define TICK_NS 1000000u
@@ -18,16 +19,25 @@ typedef struct trial {
 } trial;
 
 /* tissue below z = 0 of the world; device and world have the same axes */
-static bool rig_open(trial *r, const char *id, double k1)
+static const pal_servo_options level = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+static bool rig_open_as(trial *r, const char *id, double k1, const pal_servo_options *options)
 {
     *r = (trial){.now_ns = 1000000000, .generation = 1, .serving = true};
-    pal_servo_options o = {.backend = pal_device_virtual(), .rate_hz = 1000, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    pal_servo_options o = *options;
+    o.backend = pal_device_virtual();
+    o.rate_hz = 1000;
+    const int32_t dof_out = o.info.dof_out;
     if (pal_device_virtual()->open(&r->device, id, &o.info)) return false;
     o.device = r->device;
+    if (dof_out) o.info.dof_out = dof_out;
     pal_device_virtual()->force_enable(r->device, 1);
     r->model = (pal_wire_haptic){.n_patch = 1, .frame_us = 16667};
     r->model.patch[0] = (pal_wire_contact_patch){.id = 1, .group = 1, .n = {0, 0, 1}, .k1_N_m = (float)k1};
     return pal_servo_create(&o, &r->servo) == PAL_ERR_OK;
+}
+static bool rig_open(trial *r, const char *id, double k1)
+{
+    return rig_open_as(r, id, k1, &level);
 }
 static void rig_close(trial *r)
 {
@@ -63,6 +73,25 @@ static bool rig_event(trial *r, int kind)
     bool found = false;
     while (pal_servo_take_event(r->servo, &event)) found = found || event.kind == kind;
     return found;
+}
+
+/* carries the device to a place at 0.4 m/s */
+static void rig_carry(trial *r, const double to[3])
+{
+    double x[3], step[3];
+    pal_virtual_truth(r->device, x, NULL, NULL);
+    const int n = (int)(pal_dist3(x, to) / 0.4e-3) + 1;
+    pal_sub3(step, to, x);
+    for (int i = 0; i < n; i++) {
+        pal_axpy3(x, 1.0 / n, step);
+        pal_virtual_place(r->device, x);
+        rig_tick(r);
+    }
+}
+static void rig_buttons(trial *r, uint32_t buttons)
+{
+    const double upright[4] = {1, 0, 0, 0};
+    pal_virtual_set_handle(r->device, PAL_DEVICE_BUTTON_DEADMAN | buttons, upright);
 }
 
 /* pressed and held on 300 N/m: comes to rest, and force over depth is the plane's stiffness */
@@ -308,6 +337,245 @@ static void handle_driven_faster_than_two_metres_a_second_loses_force(void)
     rig_close(&r);
 }
 
+/* device z is the world's up, whichever that is; the frame is a rotation and x and y are level */
+static void up_of_the_device_is_the_given_direction(void)
+{
+    const double ups[4][3] = {{0, 0, 1}, {0, 1, 0}, {-1, 0, 0}, {0.6, 0, -0.8}};
+    for (int i = 0; i < 4; i++) {
+        double r[9], q[4], turned[3];
+        const double z[3] = {0, 0, 1}, x[3] = {1, 0, 0};
+        pal_workspace_rotation(ups[i], r);
+        pal_workspace_quat(r, q);
+        for (int k = 0; k < 3; k++) CHECK_NEAR(r[3 * k + 2], ups[i][k], 1e-12);
+        pal_quat_rotate(turned, q, z);
+        CHECK_LE(pal_dist3(turned, ups[i]), 1e-12);
+        pal_quat_rotate(turned, q, x);
+        CHECK_NEAR(pal_dot3(turned, ups[i]), 0, 1e-12);
+        for (int k = 0; k < 3; k++) CHECK_NEAR(turned[k], r[3 * k], 1e-12);
+    }
+}
+
+/* up of the world is y: the press goes along -y, and a handle turned about the device's z turns about the world's y */
+static void pose_and_force_are_those_of_the_world(void)
+{
+    pal_servo_options o = {0};
+    const double up[3] = {0, 1, 0}, half = sqrt(0.5), quarter[4] = {half, 0, 0, half};
+    pal_workspace_rotation(up, o.rotation);
+    trial r;
+    REQUIRE(rig_open_as(&r, "inverse3,script=press-hold,clock=virtual", 300, &o));
+    r.model.patch[0].n[2] = 0, r.model.patch[0].n[1] = 1;
+    pal_virtual_set_handle(r.device, PAL_DEVICE_BUTTON_DEADMAN, quarter);
+    rig_run(&r, 4);
+    CHECK(r.view.position_m[1] < -0.001);
+    CHECK(r.view.force_N[1] > 0.3);
+    CHECK_NEAR(fabs(r.view.force_N[0]) + fabs(r.view.force_N[2]), 0, 1e-9);
+    /* handle's x is the device's y; the device's z stays the world's y */
+    double q[4], turned[3], wanted[3];
+    const double x[3] = {1, 0, 0}, z[3] = {0, 0, 1};
+    memcpy(q, r.view.quat, sizeof q);
+    pal_quat_rotate(turned, q, x);
+    for (int k = 0; k < 3; k++) wanted[k] = o.rotation[3 * k + 1];
+    CHECK_LE(pal_dist3(turned, wanted), 1e-9);
+    pal_quat_rotate(turned, q, z);
+    CHECK_LE(pal_dist3(turned, up), 1e-9);
+    /* a turn of 0.2 rad/s about the device's z is one about the world's y */
+    for (int i = 0; i < 100; i++) {
+        const double at = 3.14159265358979 / 4 + 0.5 * 0.2e-3 * i, spin[4] = {cos(at), 0, 0, sin(at)};
+        pal_virtual_set_handle(r.device, PAL_DEVICE_BUTTON_DEADMAN, spin);
+        rig_tick(&r);
+    }
+    CHECK_NEAR(r.view.omega_rad_s[1], 0.2, 0.002);
+    CHECK_NEAR(r.view.omega_rad_s[0], 0, 1e-9);
+    rig_close(&r);
+}
+
+/* the frame of the workspace changes only without force, its scale only while the clutch is held */
+static void workspace_moves_without_force_and_scales_while_clutched(void)
+{
+    trial r;
+    REQUIRE(rig_open(&r, "inverse3,script=press-hold,clock=virtual", 300));
+    rig_run(&r, 4);
+    pal_workspace_frame frame = {.origin_m = {0, 0, 0.05}, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .scale = 1};
+    double before[3];
+    pal_copy3(before, r.view.position_m);
+    pal_servo_put_frame(r.servo, &frame);
+    rig_run(&r, 0.1);
+    CHECK_LE(pal_dist3(before, r.view.position_m), 1e-3);
+    r.model.n_patch = 0;
+    rig_run(&r, 0.5);
+    CHECK_NEAR(r.view.position_m[2], before[2] + 0.05, 0.012);
+    frame.scale = 2;
+    pal_servo_put_frame(r.servo, &frame);
+    rig_run(&r, 0.1);
+    pal_copy3(before, r.view.position_m);
+    rig_run(&r, 0.1);
+    CHECK_LE(pal_dist3(before, r.view.position_m), 2e-3);
+    rig_buttons(&r, PAL_DEVICE_BUTTON_CLUTCH);
+    rig_run(&r, 0.2);
+    pal_copy3(before, r.view.position_m);
+    double x[3], x0[3];
+    pal_virtual_truth(r.device, x0, NULL, NULL);
+    const double up[3] = {0, 0, x0[2] + 0.004};
+    rig_buttons(&r, 0);
+    rig_run(&r, 0.1);
+    pal_virtual_place(r.device, up);
+    rig_tick(&r);
+    rig_tick(&r);
+    pal_virtual_truth(r.device, x, NULL, NULL);
+    /* the world moves twice as far as the device */
+    CHECK_NEAR(r.view.position_m[2] - before[2], 2 * (x[2] - x0[2]), 1e-3);
+    rig_close(&r);
+}
+
+static void clutch_engages_below_its_force_and_holds_the_world_pose(void)
+{
+    trial r;
+    REQUIRE(rig_open(&r, "inverse3,script=press-hold,clock=virtual", 300));
+    rig_run(&r, 4);
+    CHECK(rig_force(&r) > 0.3);
+    rig_buttons(&r, PAL_DEVICE_BUTTON_CLUTCH);
+    rig_run(&r, 0.1);
+    CHECK_INT(r.view.flags & PAL_WIRE_POSE_CLUTCHED, 0);
+    CHECK(rig_force(&r) > 0.3);
+    /* softer tissue: 0.2 N */
+    rig_buttons(&r, 0);
+    r.model.patch[0].k1_N_m = 30;
+    rig_run(&r, 1);
+    const double before = rig_force(&r);
+    CHECK(before > 0.05 && before < 0.3);
+    const double turned[4] = {0.8, 0, 0.6, 0};
+    double held[3], quat[4];
+    rig_buttons(&r, PAL_DEVICE_BUTTON_CLUTCH);
+    rig_tick(&r);
+    pal_copy3(held, r.view.position_m);
+    memcpy(quat, r.view.quat, sizeof quat);
+    CHECK(r.view.flags & PAL_WIRE_POSE_CLUTCHED);
+    rig_run(&r, 0.051);
+    CHECK_NEAR(rig_force(&r), 0, 1e-9);
+    /* handle moved and turned: the world pose stands still */
+    pal_virtual_set_handle(r.device, PAL_DEVICE_BUTTON_DEADMAN | PAL_DEVICE_BUTTON_CLUTCH, turned);
+    const double away[3] = {0.02, -0.01, 0.015};
+    rig_carry(&r, away);
+    rig_run(&r, 0.2);
+    CHECK_LE(pal_dist3(held, r.view.position_m), 1e-12);
+    for (int k = 0; k < 4; k++) CHECK_NEAR(r.view.quat[k], quat[k], 1e-12);
+    pal_virtual_set_handle(r.device, PAL_DEVICE_BUTTON_DEADMAN, turned);
+    rig_tick(&r);
+    CHECK_LE(pal_dist3(held, r.view.position_m), 2e-3);
+    for (int k = 0; k < 4; k++) CHECK_NEAR(r.view.quat[k], quat[k], 1e-12);
+    /* it fades in again over a quarter of a second */
+    rig_run(&r, 0.1);
+    CHECK(r.view.fade > 0.35 && r.view.fade < 0.45);
+    rig_close(&r);
+}
+
+static void edge_of_the_workspace_is_a_soft_wall(void)
+{
+    trial r;
+    REQUIRE(rig_open(&r, "inverse3,script=still,clock=virtual", 300));
+    r.model.n_patch = 0;
+    rig_run(&r, 2.8);
+    CHECK_NEAR(rig_force(&r), 0, 0);
+    CHECK(!rig_event(&r, PAL_EVENT_WORKSPACE_EDGE));
+    const double out[3] = {0, 0.1485, 0};
+    rig_carry(&r, out);
+    pal_virtual_place(r.device, out);
+    rig_tick(&r);
+    rig_tick(&r);
+    double x[3];
+    pal_virtual_truth(r.device, x, NULL, NULL);
+    CHECK_NEAR(r.view.force_N[1], -200 * (0.1485 - 0.95 * 0.15), 0.1);
+    CHECK(rig_event(&r, PAL_EVENT_WORKSPACE_EDGE));
+    rig_close(&r);
+}
+
+/* devices that turn the hand get -r n x F of friction; others none */
+static void torque_goes_to_devices_that_have_it(void)
+{
+    for (int dof = 3; dof <= 6; dof += 3) {
+        trial r;
+        pal_servo_options o = level;
+        o.info.dof_out = dof;
+        REQUIRE(rig_open_as(&r, "inverse3,script=stroke,depth=8,clock=virtual", 300, &o));
+        r.model.patch[0].kt_N_m = 200, r.model.patch[0].mu_s = r.model.patch[0].mu_d = 0.3f;
+        r.model.patch[0].radius_m = 1; /* of the patch; the arm is checked by its ratio */
+        rig_run(&r, 4);
+        double max = 0;
+        for (int i = 0; i < 2000; i++) {
+            rig_tick(&r);
+            max = fmax(max, fabs(r.view.torque_N_m[0]));
+            if (dof == 3) continue;
+            /* (0 0 -1) x (fx fy fz) = (fy, -fx, 0) */
+            CHECK_NEAR(r.view.torque_N_m[0], r.view.force_N[1], 0.02);
+            CHECK_NEAR(r.view.torque_N_m[1], -r.view.force_N[0], 0.02);
+        }
+        if (dof == 6)
+            CHECK(max > 0.1);
+        else
+            CHECK_NEAR(max, 0, 0);
+        rig_close(&r);
+    }
+}
+
+/* nothing arrives any more, or only repeats of an old number: without force after the stale time and its fade */
+static void silence_and_repeats_of_an_old_model_end_the_force(void)
+{
+    for (int repeats = 0; repeats < 2; repeats++) {
+        trial r;
+        REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
+        rig_run(&r, 4);
+        CHECK(rig_force(&r) > 0.1);
+        r.serving = false;
+        for (int i = 0; i < 620; i++) {
+            if (repeats && i % 16 == 0) pal_servo_put_model(r.servo, &r.model, r.generation, r.now_ns);
+            rig_tick(&r);
+        }
+        CHECK_NEAR(r.view.fade, 0, 0);
+        rig_run(&r, 0.3);
+        CHECK_LE(rig_force(&r), 0.02); /* damping of the free handle */
+        CHECK_INT(repeats ? r.view.n_model_old > 30 : r.view.n_model_old == 0, 1);
+        rig_close(&r);
+    }
+}
+
+/* a server that comes back as another session finds an empty tank: pressed deep, nothing kicks */
+static void new_session_begins_with_an_empty_tank(void)
+{
+    trial r;
+    REQUIRE(rig_open(&r, "inverse3,script=press-hold,clock=virtual", 300));
+    rig_run(&r, 4);
+    CHECK(r.view.tank_mJ > 0.5);
+    const double generated = r.view.generated_mJ;
+    pal_servo_put_generation(r.servo, ++r.generation);
+    r.serving = false;
+    rig_run(&r, 0.002);
+    CHECK_LE(r.view.tank_mJ, 0);
+    CHECK_NEAR(r.view.fade, 0, 0);
+    r.seq = 0;
+    r.serving = true;
+    r.next_model_ns = r.now_ns;
+    double before = 0, step = 0;
+    for (int i = 0; i < 3000; i++) {
+        rig_tick(&r);
+        step = fmax(step, rig_force(&r) - before);
+        before = rig_force(&r);
+    }
+    CHECK_LE(step, 0.1);
+    CHECK_LE(r.view.generated_mJ, fmax(generated, 0) + fmax(0, -r.view.tank_mJ) + 1e-9);
+    rig_close(&r);
+}
+
+static void proxy_is_published_on_the_surface(void)
+{
+    trial r;
+    REQUIRE(rig_open(&r, "inverse3,script=press-hold,clock=virtual", 300));
+    rig_run(&r, 4);
+    CHECK_INT(r.view.n_proxy, 1);
+    CHECK_NEAR(r.view.proxy_m[0][2], 0, 1e-6);
+    CHECK(r.view.position_m[2] < -0.001);
+    rig_close(&r);
+}
+
 static void jitter_histogram_finds_percentiles_within_a_step(void)
 {
     static pal_jitter j;
@@ -337,6 +605,15 @@ int main(void)
     RUN(numbers_that_are_not_finite_in_a_model_give_a_fault_not_a_force);
     RUN(device_that_stops_answering_is_a_fault_that_stays);
     RUN(handle_driven_faster_than_two_metres_a_second_loses_force);
+    RUN(up_of_the_device_is_the_given_direction);
+    RUN(pose_and_force_are_those_of_the_world);
+    RUN(workspace_moves_without_force_and_scales_while_clutched);
+    RUN(clutch_engages_below_its_force_and_holds_the_world_pose);
+    RUN(edge_of_the_workspace_is_a_soft_wall);
+    RUN(torque_goes_to_devices_that_have_it);
+    RUN(silence_and_repeats_of_an_old_model_end_the_force);
+    RUN(new_session_begins_with_an_empty_tank);
+    RUN(proxy_is_published_on_the_surface);
     RUN(jitter_histogram_finds_percentiles_within_a_step);
     return check_report();
 }
