@@ -12,7 +12,7 @@ typedef struct pal_calibrate_input {
     const pal_scene *scene; /* of the recording; borrowed while the cases are used */
     /* names separated by commas; each is a load case or a reference. NULL: all touches that verify does not name */
     const char *fit;
-    const char *verify;  /* likewise, reported only; NULL: none */
+    const char *verify; /* likewise, reported only; NULL: none */
     /* "fem": finite elements, also where a reference is named. "reference": for a load case, the reference that
      * answers it. Otherwise a CSV file for the one fitted case. NULL: the CSV of a reference, finite elements for a
      * load case. Of touches: "fem" (NULL), or "recording": the displacement of the recorded body. */

@@ -43,8 +43,9 @@ static pal_err set_supports(const pal_calibrate_input *input, pal_problem *p, pa
     pal_support_def box;
     for (int k = 0; k < def->n_effect; k++)
         if (pal_support_of_effect(&def->effect[k], &box))
-            return PAL_REFUSE(diag, "effects[%d]: holds the body by springs or moves it, a calibration needs parts that "
-                                    "are fixed",
+            return PAL_REFUSE(diag,
+                              "effects[%d]: holds the body by springs or moves it, a calibration needs parts that "
+                              "are fixed",
                               k);
     for (int k = 0; k < def->n_support; k++) {
         box = def->support[k];
@@ -74,7 +75,8 @@ pal_err pal_calibrate_recorded_problem(const pal_calibrate_input *input, pal_pro
 {
     const pal_body_def *def = &input->scene->body[input->recorded->body];
     if (!def->cells && def->mesh->tets.n_node < 1)
-        return PAL_REFUSE(diag, "%s: body \"%s\" is a surface without an inside, springs of a solid do not stand for it",
+        return PAL_REFUSE(diag,
+                          "%s: body \"%s\" is a surface without an inside, springs of a solid do not stand for it",
                           input->problem, def->name);
     pal_problem *p = *out = calloc(1, sizeof *p);
     if (!p || pal_surface_copy(&def->mesh->surface, surface))

@@ -18,7 +18,7 @@ typedef struct pal_calibrate_run {
     pal_calibrate_options options;
     pal_fit_options fit;
     bool annealing;
-    const char *from; /* path of a recording; NULL: a problem */
+    const char *from;                      /* path of a recording; NULL: a problem */
     const char *path[PAL_CALIBRATE_FILES]; /* all but the scene's may be NULL */
     /* result */
     pal_calibrate_cases set;
@@ -35,8 +35,8 @@ typedef struct pal_calibrate_run {
     bool settled;      /* live is valid */
     pal_settle_report live;
     pal_release_report release; /* n_run 0: the damping was not looked for in a release */
-    double damping_1_s; /* as written to the scene */
-    int n_substep;      /* sub-steps of a step of the scene at rest */
+    double damping_1_s;         /* as written to the scene */
+    int n_substep;              /* sub-steps of a step of the scene at rest */
     double settle_s, total_s;
 } pal_calibrate_run;
 

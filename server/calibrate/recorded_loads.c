@@ -21,15 +21,14 @@ struct pal_load_recorder {
     double *mass_kg, *rest; /* frame of the file [n_node][3]    */
     /* the touch */
     phase phase;
-    bool begun;               /* there was one                       */
-    double *before;           /* positions before the first one [n_node][3] */
-    double *mean_N, mean_v2;  /* means of forces [n_node][3] and of the squared speed, times weight */
+    bool begun;                              /* there was one                       */
+    double *before;                          /* positions before the first one [n_node][3] */
+    double *mean_N, mean_v2;                 /* means of forces [n_node][3] and of the squared speed, times weight */
     double weight, max_u, largest_u, held_u; /* of the touch, of all, in `held`: rms displacement */
     bool grasped;
     pal_recorded_load held;   /* its stillest moment so far, at all nodes */
     pal_recorded_release now; /* its forces; x as numbers of nodes, in `seen` */
     int n_force, released;    /* forces so far; steps before the last force ended */
-    double *u0;               /* [n_node][3] */
 };
 
 pal_err pal_load_recorder_create(const pal_scene *scene, int body, pal_load_recorder **out)
@@ -49,7 +48,7 @@ static void free_load(pal_recorded_load *load)
 
 static void free_release(pal_recorded_release *r)
 {
-    PAL_FREE(r->x, r->first, r->point, r->force_N, r->amplitude);
+    PAL_FREE(r->x, r->first, r->point, r->force_N, r->rms_m);
     *r = (pal_recorded_release){0};
 }
 
@@ -76,7 +75,7 @@ void pal_load_recorder_destroy(pal_load_recorder *r)
     pal_recorded_loads_free(&r->out);
     free_load(&r->held);
     free_release(&r->now);
-    PAL_FREE(r->mass_kg, r->rest, r->before, r->mean_N, r->u0, r);
+    PAL_FREE(r->mass_kg, r->rest, r->before, r->mean_N, r);
 }
 
 double pal_load_recorder_max_N(const pal_load_recorder *recorder)
@@ -94,7 +93,6 @@ static void allocate(pal_load_recorder *r, const pal_body *body)
     PAL_ARRAY(&r->err, r->mean_N, 3 * n);
     PAL_ARRAY(&r->err, r->held.force_N, 3 * n);
     PAL_ARRAY(&r->err, r->held.u, 3 * n);
-    PAL_ARRAY(&r->err, r->u0, 3 * n);
     if (r->err) return;
     memcpy(r->mass_kg, body->node_mass_kg, (size_t)n * sizeof(double));
     memcpy(r->before, body->node_rest, 3 * (size_t)n * sizeof(double));
@@ -122,12 +120,12 @@ static double share_of_load(const pal_load_recorder *r, const pal_world *world)
 {
     const pal_body *body = pal_world_view_body(world, r->out.body);
     const pal_tools *tools = pal_world_tools(world);
-    double load[3] = {0}, felt[3] = {0};
+    double load[3] = {0}, from_tools[3] = {0};
     if (!body->implicit) return 1;
     for (int i = 0; i < r->n_node; i++) pal_add3(load, load, body->load + 3 * i);
-    for (int t = 0; t < tools->n_tool; t++) pal_sub3(felt, felt, tools->tool[t].force_N);
+    for (int t = 0; t < tools->n_tool; t++) pal_sub3(from_tools, from_tools, tools->tool[t].force_N);
     double size2 = pal_dot3(load, load);
-    return size2 > 0 ? fmin(fmax(pal_dot3(felt, load) / size2, 0), 1) : 1;
+    return size2 > 0 ? fmin(fmax(pal_dot3(from_tools, load) / size2, 0), 1) : 1;
 }
 
 static void begin_touch(pal_load_recorder *r, const pal_world *world)
@@ -136,8 +134,8 @@ static void begin_touch(pal_load_recorder *r, const pal_world *world)
     pal_world_current_material(world, r->out.body, &now);
     if (!(r->out.material.young_Pa > 0)) r->out.material = now;
     const pal_material *first = &r->out.material;
-    r->edited |= now.young_Pa != first->young_Pa || now.poisson != first->poisson ||
-                 now.density_kg_m3 != first->density_kg_m3;
+    r->edited |=
+        now.young_Pa != first->young_Pa || now.poisson != first->poisson || now.density_kg_m3 != first->density_kg_m3;
     memset(r->mean_N, 0, 3 * (size_t)r->n_node * sizeof(double));
     r->mean_v2 = r->weight = r->max_u = r->held_u = 0;
     r->held.size_N = 0, r->held.speed_1_s = INFINITY;
@@ -205,20 +203,10 @@ static void find_held(pal_load_recorder *r, const pal_world *world, const pal_bo
 
 /* ---- after it ---- */
 
-static void log_amplitude(pal_load_recorder *r, const pal_body *body)
+static void log_motion(pal_load_recorder *r, const pal_body *body)
 {
-    double sum = 0, whole = 0, u[3];
-    if (r->err) return;
-    for (int i = 0; i < r->n_node; i++) {
-        pal_sub3(u, body->d + 3 * i, r->before + 3 * i);
-        if (r->now.n == 0) pal_copy3(r->u0 + 3 * i, u);
-        sum += r->mass_kg[i] * pal_dot3(u, r->u0 + 3 * i);
-        whole += r->mass_kg[i] * pal_dot3(r->u0 + 3 * i, r->u0 + 3 * i);
-    }
-    if (!PAL_GROW(r->now.amplitude, r->now.n))
-        r->err = PAL_ERR_MEMORY;
-    else
-        r->now.amplitude[r->now.n++] = whole > 0 ? sum / whole : 0;
+    if (!r->err && !PAL_GROW(r->now.rms_m, r->now.n)) r->err = PAL_ERR_MEMORY;
+    if (!r->err) r->now.rms_m[r->now.n++] = sqrt(mean_square(r, body->d, r->before));
 }
 
 /* points of the nodes that have a force in the held moment */
@@ -270,28 +258,28 @@ static void number_points(pal_load_recorder *r, pal_recorded_release *to)
 static void keep_release(pal_load_recorder *r)
 {
     pal_recorded_release *now = &r->now, *best = &r->out.release;
-    const double step = r->scene->step_s, start = sqrt(mean_square(r, r->u0, NULL));
+    const double step = r->scene->step_s, start = now->n > 0 ? now->rms_m[0] : 0;
     char longer[80];
     snprintf(longer, sizeof longer, "the tissue comes to rest too seldom, not within %g s", PAL_RELEASE_TOUCH_S);
-    const char *why = r->phase != AFTER || now->n * step < PAL_RELEASE_LEAST_S ? "the recording ends, or the next touch "
-                                                                                 "begins, too soon after a touch"
-                      : now->n_step * step > PAL_RELEASE_TOUCH_S ? longer
-                      : start < PAL_RELEASE_SHARE * r->max_u     ? "the tissue followed the hand back to rest"
-                                                                 : NULL;
+    const char *why = r->phase != AFTER || now->n * step < PAL_RELEASE_MIN_S ? "the recording ends, or the next touch "
+                                                                               "begins, too soon after a touch"
+                      : now->n_step * step > PAL_RELEASE_TOUCH_S             ? longer
+                      : start < PAL_RELEASE_SHARE * r->max_u ? "the tissue followed the hand back to rest"
+                                                             : NULL;
     if (why && !r->out.has_release) snprintf(r->out.no_release, sizeof r->out.no_release, "%s", why);
-    if (why || r->err || start <= best->start_m) return;
+    if (why || r->err || (best->n > 0 && start <= best->rms_m[0])) return;
     free_release(best);
-    *best = (pal_recorded_release){.time_s = now->time_s, .step_s = step, .start_m = start, .n = now->n};
+    *best = (pal_recorded_release){.time_s = now->time_s, .step_s = step, .n = now->n};
     best->n_step = r->released;
     PAL_ARRAY(&r->err, best->first, best->n_step + 1);
     PAL_ARRAY(&r->err, best->point, r->n_force);
     PAL_ARRAY(&r->err, best->force_N, 3 * r->n_force);
-    PAL_ARRAY(&r->err, best->amplitude, best->n);
+    PAL_ARRAY(&r->err, best->rms_m, best->n);
     if (r->err) return;
     memcpy(best->first, now->first, (size_t)best->n_step * sizeof *best->first);
     memcpy(best->point, now->point, (size_t)r->n_force * sizeof *best->point);
     memcpy(best->force_N, now->force_N, 3 * (size_t)r->n_force * sizeof(double));
-    memcpy(best->amplitude, now->amplitude, (size_t)best->n * sizeof(double));
+    memcpy(best->rms_m, now->rms_m, (size_t)best->n * sizeof(double));
     /* forces of the steps after it are 0 */
     best->first[best->n_step] = r->n_force;
     number_points(r, best);
@@ -333,7 +321,7 @@ void pal_load_recorder_step(pal_load_recorder *r, const pal_world *world)
     } else if (r->phase != IDLE) {
         if (r->phase == TOUCHED) r->now.time_s = r->time_s;
         r->phase = AFTER;
-        log_amplitude(r, body);
+        log_motion(r, body);
         if (r->now.n * step >= PAL_RELEASE_S) pal_load_recorder_stop(r);
     }
     if (!r->begun) memcpy(r->before, body->d, 3 * (size_t)r->n_node * sizeof(double));

@@ -19,7 +19,8 @@ typedef struct job {
     pal_body *body;
     int32_t (*node)[PAL_TET_CORNERS]; /* of the tetrahedron around each point, [n_x] */
     double (*weight)[PAL_TET_CORNERS];
-    double *force_N, *u0; /* scratch [n_node][3] */
+    double *force_N;           /* scratch [n_node][3]            */
+    double *decay, *own_decay; /* recorded; scratch [release->n] */
     double work;
     int n_planned;
     pal_release_report *out;
@@ -35,7 +36,8 @@ static pal_err locate_points(job *j)
     PAL_ARRAY(&err, j->node, r->n_x);
     PAL_ARRAY(&err, j->weight, r->n_x);
     PAL_ARRAY(&err, j->force_N, 3 * j->body->n_node);
-    PAL_ARRAY(&err, j->u0, 3 * j->body->n_node);
+    PAL_ARRAY(&err, j->decay, r->n);
+    PAL_ARRAY(&err, j->own_decay, r->n);
     if (!err) err = pal_locate_create(t, NULL, &locate);
     for (int i = 0; i < r->n_x && !err; i++) {
         double x[3], local[4];
@@ -57,8 +59,7 @@ static pal_err set_forces(job *j, int step)
     memset(j->force_N, 0, 3 * (size_t)n * sizeof(double));
     for (int k = step < r->n_step ? r->first[step] : 0; step < r->n_step && k < r->first[step + 1]; k++)
         for (int c = 0; c < PAL_TET_CORNERS; c++)
-            pal_axpy3(j->force_N + 3 * j->node[r->point[k]][c], j->weight[r->point[k]][c],
-                      r->force_N + 3 * (size_t)k);
+            pal_axpy3(j->force_N + 3 * j->node[r->point[k]][c], j->weight[r->point[k]][c], r->force_N + 3 * (size_t)k);
     for (int i = 0; i < n; i++) {
         const double *has = j->body->external_force ? j->body->external_force + 3 * i : NULL, *f = j->force_N + 3 * i;
         if (has ? has[0] == f[0] && has[1] == f[1] && has[2] == f[2] : pal_norm3(f) == 0) continue;
@@ -68,17 +69,23 @@ static pal_err set_forces(job *j, int step)
     return PAL_ERR_OK;
 }
 
-static double amplitude(const job *j, bool first)
+/* rms displacement u [n] -> decay curve, in place */
+static void find_decay(double *u, int n)
 {
-    const pal_body *b = j->body;
-    double sum = 0, whole = 0, u[3];
+    double sum = 0;
+    for (int k = n - 1; k >= 0; k--) u[k] = sum += u[k] * u[k];
+    for (int k = 0; k < n; k++) u[k] = sum > 0 ? sqrt(u[k] / sum) : 0;
+}
+
+static double rms_of(const pal_body *b)
+{
+    double sum = 0, mass = 0, u[3];
     for (int i = 0; i < b->n_node; i++) {
         pal_sub3(u, b->d + 3 * i, b->node_rest + 3 * i);
-        if (first) pal_copy3(j->u0 + 3 * i, u);
-        sum += b->node_mass_kg[i] * pal_dot3(u, j->u0 + 3 * i);
-        whole += b->node_mass_kg[i] * pal_dot3(j->u0 + 3 * i, j->u0 + 3 * i);
+        sum += b->node_mass_kg[i] * pal_dot3(u, u);
+        mass += b->node_mass_kg[i];
     }
-    return whole > 0 ? sum / whole : 0;
+    return sqrt(sum / mass);
 }
 
 /* e at a rate; DBL_MAX: the body froze or its steps were refused */
@@ -98,10 +105,10 @@ static pal_err evaluate(job *j, double rate_1_s, double *percent)
         PAL_TRY(set_forces(j, step));
         if (pal_world_step(j->world, r->step_s) || j->body->frozen) return PAL_ERR_OK;
         j->work -= (double)pal_world_substeps(j->world) * j->body->tets->n_tet;
-        if (step < r->n_step) continue;
-        double off = amplitude(j, step == r->n_step) - r->amplitude[step - r->n_step];
-        sum += off * off;
+        if (step >= r->n_step) j->own_decay[step - r->n_step] = rms_of(j->body);
     }
+    find_decay(j->own_decay, r->n);
+    for (int k = 0; k < r->n; k++) sum += pow(j->own_decay[k] - j->decay[k], 2);
     j->out->n_run++;
     *percent = 100 * sqrt(sum / r->n);
     return PAL_ERR_OK;
@@ -151,25 +158,26 @@ static pal_err fit(job *j)
         if (j->out->percent < before) best = n;
     }
     if (best < 0 || n < PAL_RELEASE_RATES) return PAL_ERR_OK;
-    j->out->fitted = true;
     PAL_TRY(narrow(j, low + fmax(best - 1, 0) * width, low + fmin(best + 1, PAL_RELEASE_RATES - 1) * width));
-    double found = log(j->out->damping_1_s);
-    j->out->at_bound = found < low + PAL_RELEASE_WIDTH || found > log(PAL_RELEASE_HIGH_1_S) - PAL_RELEASE_WIDTH;
+    j->out->fitted = j->out->percent < PAL_RELEASE_PERCENT;
     return PAL_ERR_OK;
 }
 
 pal_err pal_release_damping(const pal_scene *scene, const pal_recorded_release *release,
                             const pal_settle_options *options, pal_release_report *out, pal_diagnostic *diag)
 {
-    job j = {.scene = scene, .release = release, .options = options, .work = options->max_work, .out = out, .diag = diag};
+    job j = {
+        .scene = scene, .release = release, .options = options, .work = options->max_work, .out = out, .diag = diag};
     *out = (pal_release_report){
         .percent = DBL_MAX, .damping_1_s = NAN, .start_percent = NAN, .seconds = release->n * release->step_s};
     PAL_TRY(pal_settle_world(scene, PAL_RELEASE_LOW_1_S, &j.world, diag));
     j.body = pal_world_body(j.world, 0);
     j.body->load_cap_N = INFINITY;
     pal_err err = locate_points(&j);
+    if (!err) memcpy(j.decay, release->rms_m, (size_t)release->n * sizeof(double));
+    if (!err) find_decay(j.decay, release->n);
     if (!err) err = fit(&j);
-    PAL_FREE(j.node, j.weight, j.force_N, j.u0);
+    PAL_FREE(j.node, j.weight, j.force_N, j.decay, j.own_decay);
     pal_world_destroy(j.world);
     return err;
 }

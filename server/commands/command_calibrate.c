@@ -11,6 +11,7 @@
 #include "server/commands/tuning.h"
 #include "server/num/median.h"
 #include "server/scene/json_reader.h"
+#include "server/study/tuning.h"
 
 #include <errno.h>
 #include <float.h>
@@ -136,7 +137,9 @@ static pal_err check_source(const char *flag, const char *path, const char *sour
 
 static pal_err check_targets(const pal_calibrate_run *run, pal_diagnostic *diag)
 {
+    char folder_scene[PATH_MAX];
     const int *grid = run->options.grid;
+    snprintf(folder_scene, sizeof folder_scene, "%s/scene.json", run->input.problem);
     if ((int64_t)grid[0] * grid[1] * grid[2] > MAX_GRID)
         return PAL_REFUSE(diag, "--grid: %d x %d x %d nodes, more than the %d that a scene file holds", grid[0],
                           grid[1], grid[2], MAX_GRID);
@@ -146,6 +149,7 @@ static pal_err check_targets(const pal_calibrate_run *run, pal_diagnostic *diag)
         PAL_TRY(check_source(target_flag[a], path[a], run->input.problem, "problem", diag));
         PAL_TRY(check_source(target_flag[a], path[a], run->input.truth, "truth", diag));
         PAL_TRY(check_source(target_flag[a], path[a], run->from, "recording", diag));
+        PAL_TRY(check_source(target_flag[a], path[a], folder_scene, "scene that was recorded", diag));
         for (int b = 0; b < a && path[a]; b++)
             if (path[b] && is_same_file(path[a], path[b]))
                 return PAL_REFUSE(diag, "%s: %.200s is the file of %s as well", target_flag[a], path[a],
@@ -184,7 +188,9 @@ static pal_err prepare_touches(pal_calibrate_run *run, pal_recorded_loads *loads
     for (;; run->load_share /= 2) {
         pal_err err = prepare(run, diag);
         bool none = err == PAL_ERR_NUMERIC || (!err && !(run->start.error_percent < DBL_MAX));
-        if (!none || (run->input.truth && !strcmp(run->input.truth, "recording")) || run->load_share < PAL_LEAST_LOAD_SHARE) return err;
+        if (!none || (run->input.truth && !strcmp(run->input.truth, "recording")) ||
+            run->load_share < PAL_MIN_LOAD_SHARE)
+            return err;
         pal_calibration_workspace_destroy(run->workspace);
         pal_calibration_destroy(run->calibration);
         run->workspace = NULL, run->calibration = NULL;
@@ -266,6 +272,8 @@ static pal_err open_recording(pal_calibrate_run *run, pal_recorded_input *record
     run->input.scene = recorded->scene.studied.scene;
     pal_configuration_of(run->input.scene, recorded->loads.body, &served);
     if (run->options.voxel.resolution == 0) run->options.voxel.resolution = served.size;
+    /* forces on few nodes would be followed best without volume springs, and the body would not bear the next hand */
+    run->options.min_volume_ratio = PAL_MIN_VOLUME_RATIO;
     return PAL_ERR_OK;
 }
 
@@ -393,11 +401,13 @@ static void print_release(const pal_calibrate_run *run)
     const pal_release_report *r = &run->release;
     if (!recorded) return;
     if (r->fitted)
-        printf("release at %.2f s: with damping %.3g 1/s the springs return as recorded, %.2g %% RMS of %.2f s%s\n",
-               recorded->release.time_s, r->damping_1_s, r->percent, r->seconds,
-               r->at_bound ? ", the limit of what is tried" : "");
+        printf("release at %.2f s: with damping %.3g 1/s the springs return as recorded, %.2g %% RMS of %.2f s\n",
+               recorded->release.time_s, r->damping_1_s, r->percent, r->seconds);
     else if (!recorded->has_release)
         printf("release: none to fit the damping to: %s\n", recorded->no_release);
+    else if (run->settled && r->percent < DBL_MAX)
+        printf("release at %.2f s: the springs return otherwise with any damping, at best %.2g %% RMS of %.2f s\n",
+               recorded->release.time_s, r->percent, r->seconds);
     else if (run->settled)
         printf("release: no damping was found before the work allowed was used up\n");
 }
@@ -406,8 +416,13 @@ static void print_constants(const pal_calibrate_run *run)
 {
     for (int k = 0; k < run->info.n_kind; k++) {
         if (!run->info.grid) {
+            const bool smallest =
+                run->info.kind[k] == PAL_SPRING_VOLUME && run->options.min_volume_ratio > 0 && ratio_of(run, k) < 1;
             printf("%s %.6g J, %.3g times the start%s\n", pal_calibrate_key(run, k, true), exp(run->theta[k]),
-                   ratio_of(run, k), count_bound(run, k) ? ", as far as --decades lets it go" : "");
+                   ratio_of(run, k),
+                   !count_bound(run, k) ? ""
+                   : smallest           ? ", the smallest with which a body recovers from inversion"
+                                        : ", as far as --decades lets it go");
             continue;
         }
         spread s = spread_of(run, k);
@@ -469,16 +484,16 @@ static cJSON *cases_json(const pal_calibrate_run *run)
     for (int k = 0; k < run->set.n; k++) {
         const pal_settle_run *live = &run->live.load[k];
         const pal_recorded_load *touch = touch_of(run, k);
-        cJSON *o = PAL_JSON({"id", JSON_TEXT(run->set.id[k])}, {"fitted", JSON_BOOL(run->set.list[k].fit)},
-                     {"truth", JSON_TEXT(truth_of(run, k))},
-                     {"kinematics", JSON_TEXT(run->set.list[k].linear ? "linear" : "finite")},
-                     {"start_percent", pal_json_or_null(run->start.case_percent[k])},
-                     {"hand_percent", pal_json_or_null(run->hand.case_percent[k])},
-                     {"percent", pal_json_or_null(run->last.case_percent[k])},
-                     {"most_m", pal_json_or_null(run->info.max_m[k])},
-                     {"points", pal_json_or_null(run->info.n_point[k])},
-                     {"live_s", pal_json_or_null(run->settled && live->steady ? live->seconds : NAN)},
-                     {"live_difference_percent", pal_json_or_null(run->settled ? live->difference_percent : NAN)});
+        cJSON *o = PAL_JSON(
+            {"id", JSON_TEXT(run->set.id[k])}, {"fitted", JSON_BOOL(run->set.list[k].fit)},
+            {"truth", JSON_TEXT(truth_of(run, k))},
+            {"kinematics", JSON_TEXT(run->set.list[k].linear ? "linear" : "finite")},
+            {"start_percent", pal_json_or_null(run->start.case_percent[k])},
+            {"hand_percent", pal_json_or_null(run->hand.case_percent[k])},
+            {"percent", pal_json_or_null(run->last.case_percent[k])}, {"most_m", pal_json_or_null(run->info.max_m[k])},
+            {"points", pal_json_or_null(run->info.n_point[k])},
+            {"live_s", pal_json_or_null(run->settled && live->steady ? live->seconds : NAN)},
+            {"live_difference_percent", pal_json_or_null(run->settled ? live->difference_percent : NAN)});
         if (touch)
             PAL_JSON_ADD(o, {"time_s", JSON_NUMBER(touch->time_s)}, {"force_N", JSON_NUMBER(pal_norm3(touch->total_N))},
                          {"speed_1_s", pal_json_or_null(touch->speed_1_s)});
@@ -526,7 +541,7 @@ static cJSON *release_json(const pal_calibrate_run *run)
     if (!recorded || !r->fitted) return cJSON_CreateNull();
     return PAL_JSON({"time_s", JSON_NUMBER(recorded->release.time_s)}, {"seconds", JSON_NUMBER(r->seconds)},
                     {"damping_1_s", JSON_NUMBER(r->damping_1_s)}, {"percent", JSON_NUMBER(r->percent)},
-                    {"at_bound", JSON_BOOL(r->at_bound)}, {"runs", JSON_NUMBER(r->n_run)});
+                    {"runs", JSON_NUMBER(r->n_run)});
 }
 
 static cJSON *as_json(const pal_calibrate_run *run)
@@ -592,7 +607,8 @@ int command_calibrate(int argc, char **argv)
     pal_calibrate_default(o);
     o->voxel.resolution = 0;
     const pal_flag flag[] = {
-        {"--case", "ID[,ID...]", PAL_FLAG_TEXT, &run.input.fit, 0, 0, "load cases or references to fit (with --from all touches but those of --verify)"},
+        {"--case", "ID[,ID...]", PAL_FLAG_TEXT, &run.input.fit, 0, 0,
+         "load cases or references to fit (with --from all touches but those of --verify)"},
         {"--from", "RECORDING", PAL_FLAG_TEXT, &run.from, 0, 0,
          "log of a session (palpate serve --record) of the scene, whose touches are the load cases"},
         {"--verify", "ID[,ID...]", PAL_FLAG_TEXT, &run.input.verify, 0, 0, "others, whose error is only reported"},
@@ -611,7 +627,8 @@ int command_calibrate(int argc, char **argv)
         {"--workers", "N", PAL_FLAG_COUNT, &run.fit.n_worker, 1, 256,
          "annealing: threads; the result is the same for any number (one per core)"},
         {"--resolution", "N", PAL_FLAG_COUNT, &o->voxel.resolution, 2, 200,
-         "voxels along the longest axis (the least even number that gives more than 700 nodes; with --from the scene's)"},
+         "voxels along the longest axis (the least even number that gives more than 700 nodes; with --from the "
+         "scene's)"},
         {"--split", "K", PAL_FLAG_COUNT, &o->split, 1, 8,
          "the finite elements of the truth are K x K x K to a voxel (2)"},
         {"--kinematics", "finite|linear", PAL_FLAG_WORD, &run.input.kinematics, 0, 0,
@@ -636,14 +653,21 @@ int command_calibrate(int argc, char **argv)
         {"--vtk", "FILE", PAL_FLAG_TEXT, &run.path[PAL_CALIBRATE_VTK], 0, 0,
          "write a legacy VTK file with constants and the displacements of truth and springs"},
     };
-    const pal_flag_table table = {.usage = "calibrate PROBLEM.json --case ID | SCENE --from RECORDING  -o SCENE.json [flags]",
-                                  .about = about,
-                                  .example = "palpate calibrate deploy/problems/gear.json --case twist --verify push "
-                                             "--resolution 10 --budget 5 -o gear.json\n"
-                                             "palpate calibrate deploy/problems/cube.json --case push --grid 3x3x3 "
-                                             "--resolution 6 --budget 5 --picture cube.svg -o cube.json\n",
-                                  PAL_FLAGS(flag),
-                                  .operands = {1, 1}};
+    const pal_flag_table table = {
+        .usage = "calibrate PROBLEM.json --case ID | SCENE --from RECORDING  -o SCENE.json [flags]",
+        .about = about,
+        .example = "palpate calibrate deploy/problems/gear.json --case twist --verify push "
+                   "--resolution 10 --budget 5 -o gear.json\n"
+                   "palpate calibrate deploy/problems/cube.json --case push --grid 3x3x3 "
+                   "--resolution 6 --budget 5 --picture cube.svg -o cube.json\n"
+                   "palpate prepare --procedural -o organ\n"
+                   "palpate serve organ/scene.json --record pull.log --port 8390 --seconds 6 & "
+                   "sleep 1; palpate-client ws://127.0.0.1:8390/ws --script pull --seconds 4; "
+                   "wait\n"
+                   "palpate calibrate organ/scene.json --from pull.log --resolution 12 --split 1 "
+                   "--budget 10 -o fitted.json\n",
+        PAL_FLAGS(flag),
+        .operands = {1, 1}};
     int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.input.problem, &n);
     if (code >= 0) return code;
     const char *sentence = read_arguments(&run, &args);

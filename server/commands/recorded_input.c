@@ -23,11 +23,11 @@ static pal_err replay(watch *w, const char *log, pal_recorded_input *out, pal_di
         if (pal_load_recorder_create(scene, w->n_body, &w->recorder[w->n_body]))
             return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the loads of a recording");
     PAL_TRY(pal_replay_run(log, scene, &(pal_replay_watch){step, w}, &out->replay, diag));
-    int most = 0;
+    int largest = 0;
     for (int b = 0; b < w->n_body; b++) pal_load_recorder_stop(w->recorder[b]);
     for (int b = 1; b < w->n_body; b++)
-        if (pal_load_recorder_max_N(w->recorder[b]) > pal_load_recorder_max_N(w->recorder[most])) most = b;
-    return pal_diagnostic_prefix(diag, pal_load_recorder_end(w->recorder[most], &out->loads, diag), log);
+        if (pal_load_recorder_max_N(w->recorder[b]) > pal_load_recorder_max_N(w->recorder[largest])) largest = b;
+    return pal_diagnostic_prefix(diag, pal_load_recorder_end(w->recorder[largest], &out->loads, diag), log);
 }
 
 pal_err pal_recorded_input_open(const char *scene, const char *log, pal_flag_common *common, pal_recorded_input *out,

@@ -22,8 +22,8 @@ typedef struct pal_replay_watch {
 } pal_replay_watch;
 
 /* Runs the log at path against a world of this scene. A different hash is not an error; the report gives it. REFUSED:
- * not a log, truncated, of another scene, or records were dropped while it was written; STATE: the watch stopped it; IO;
- * MEMORY; errors of pal_world_create. watch may be NULL. */
+ * not a log, truncated, of another scene, or records were dropped while it was written; STATE: the watch stopped it;
+ * IO; MEMORY; errors of pal_world_create. watch may be NULL. */
 pal_err pal_replay_run(const char *path, const pal_scene *scene, const pal_replay_watch *watch, pal_replay_report *out,
                        pal_diagnostic *diag);
 /* the same from memory; name appears in diagnostics; scene NULL: only checks that the log is complete */

@@ -234,8 +234,7 @@ static pal_err add_point(const job *j, const double point_m[3], const double for
     int element = pal_locate_point(j->locate, x, local, &outside);
     if (outside > j->body->edge_m)
         return PAL_REFUSE(j->diag, "%s: the point (%g, %g, %g) lies %g m outside the body, more than a voxel (%g m)",
-                          path_of(j).text, point_m[0], point_m[1], point_m[2], outside,
-                          j->body->edge_m);
+                          path_of(j).text, point_m[0], point_m[1], point_m[2], outside, j->body->edge_m);
     spread(j, element, local, force_N);
     return PAL_ERR_OK;
 }

@@ -18,7 +18,7 @@ typedef struct bar {
     pal_world *world;
     pal_load_recorder *recorder;
     int n_hold;
-    double felt_N[2][3]; /* on the tissue at the end of each hold */
+    double tissue_N[2][3]; /* on the tissue at the end of each hold */
 } bar;
 
 static const double young_Pa = 1e5, damping_1_s = 8, tool_m = 0.03;
@@ -54,8 +54,8 @@ static bool bar_open(bar *b, const double factor[3])
     b->scene->n_body = 1;
     pal_body_def *def = &b->scene->body[0];
     pal_body_default(def, "bar", &b->mesh);
-    def->material = (pal_material){
-        .young_Pa = young_Pa, .poisson = 0.4, .density_kg_m3 = 1000, .damping_1_s = damping_1_s};
+    def->material =
+        (pal_material){.young_Pa = young_Pa, .poisson = 0.4, .density_kg_m3 = 1000, .damping_1_s = damping_1_s};
     for (int i = 1; i < def->n_effect; i++) def->effect[i - 1] = def->effect[i]; /* no weight */
     def->n_effect--;
     def->support[0] = (pal_support_def){.low_m = {-1, -1, -1}, .high_m = {-0.199999, 1, 1}};
@@ -94,7 +94,7 @@ static void move(bar *b, const double from[3], const double to[3], double second
     }
     /* the force on the tissue at the end of a hold */
     if (still && b->n_hold < 2 && seconds > 1 && pal_norm3(pal_world_tools(b->world)->tool[0].force_N) > 0)
-        pal_scale3(b->felt_N[b->n_hold++], -1, pal_world_tools(b->world)->tool[0].force_N);
+        pal_scale3(b->tissue_N[b->n_hold++], -1, pal_world_tools(b->world)->tool[0].force_N);
 }
 
 /* a press on the free end, held; back; a pull sideways, held, and let go */
@@ -129,9 +129,9 @@ static void forces_are_those_that_the_tool_feels(void)
             double sum[3] = {0};
             for (int n = 0; n < l->n_point; n++) pal_add3(sum, sum, l->force_N + 3 * n);
             printf("  %s: %.3f N at %.2f s, on %d nodes, %.2g 1/s, the tool felt %.3f N\n", l->id,
-                   pal_norm3(l->total_N), l->time_s, l->n_point, l->speed_1_s, pal_norm3(b.felt_N[i]));
+                   pal_norm3(l->total_N), l->time_s, l->n_point, l->speed_1_s, pal_norm3(b.tissue_N[i]));
             /* held for 2 s, six times the return time of the bar: the force is that of the last step to 1 % */
-            CHECK_LE(pal_dist3(sum, b.felt_N[i]), 0.01 * pal_norm3(sum));
+            CHECK_LE(pal_dist3(sum, b.tissue_N[i]), 0.01 * pal_norm3(sum));
             CHECK_LE(l->speed_1_s, 0.01);
             CHECK(l->n_point > 3);
         }
@@ -157,8 +157,7 @@ static pal_err fit_make(fit *f, bar *b, const char *truth)
     pal_calibrate_options options;
     const pal_fit_options search = {.max_evaluation = 200};
     PAL_TRY(pal_load_recorder_end(b->recorder, &f->loads, &diag));
-    const pal_calibrate_input input = {
-        .problem = "bar", .recorded = &f->loads, .scene = b->scene, .truth = truth};
+    const pal_calibrate_input input = {.problem = "bar", .recorded = &f->loads, .scene = b->scene, .truth = truth};
     pal_calibrate_default(&options);
     options.voxel.resolution = 8;
     PAL_TRY(pal_calibrate_cases_read(&input, &f->set, &diag));
@@ -201,7 +200,7 @@ static void springs_that_a_hand_pressed_are_found_again(void)
     CHECK_INT(pal_release_damping(b.scene, &f.loads.release, &options, &release, &diag), 0);
     printf("  damping %.3f 1/s, %.2g %% (at 1 1/s %.2g %%) of %.2f s, %d runs\n", release.damping_1_s, release.percent,
            release.start_percent, release.seconds, release.n_run);
-    CHECK(release.fitted && !release.at_bound);
+    CHECK(release.fitted);
     CHECK_NEAR(release.damping_1_s, damping_1_s, 0.01 * damping_1_s);
     CHECK_LE(release.percent, 0.05 * release.start_percent);
     fit_free(&f);
@@ -268,11 +267,32 @@ static void a_recording_without_touch_or_release_says_so(void)
     bar_close(&b);
 }
 
+/* much softer springs return more slowly at every rate */
+static void no_damping_is_named_that_does_not_explain_the_release(void)
+{
+    static const double one[3] = {1, 1, 1}, soft[3] = {0.05, 0.05, 0.05};
+    bar b, other;
+    pal_recorded_loads loads;
+    pal_release_report release;
+    pal_settle_options options;
+    REQUIRE(bar_open(&b, one) && bar_open(&other, soft));
+    press_and_pull(&b, 2);
+    REQUIRE(!pal_load_recorder_end(b.recorder, &loads, &diag));
+    pal_settle_default(&options);
+    CHECK_INT(pal_release_damping(other.scene, &loads.release, &options, &release, &diag), 0);
+    printf("  best %.3g %% at %.3g 1/s\n", release.percent, release.damping_1_s);
+    CHECK(!release.fitted && release.percent < DBL_MAX);
+    pal_recorded_loads_free(&loads);
+    bar_close(&b);
+    bar_close(&other);
+}
+
 int main(void)
 {
     RUN(forces_are_those_that_the_tool_feels);
     RUN(springs_that_a_hand_pressed_are_found_again);
     RUN(springs_follow_finite_elements_that_a_hand_pressed);
+    RUN(no_damping_is_named_that_does_not_explain_the_release);
     RUN(a_hand_in_motion_shows_no_rest);
     RUN(a_recording_without_touch_or_release_says_so);
     return check_report();

@@ -26,9 +26,9 @@ typedef struct pal_problem_load {
     double normal[3];
     double traction_Pa[3], total_N[3]; /* one of them given: has_traction, has_total (traction wins) */
     bool has_traction, has_total;
-    double point_m[3], force_N[3]; /* POINT: to the element around it by its shape functions    */
-    double gravity_m_s2[3];        /* GRAVITY                                                  */
-    int n_points;                  /* POINTS: as POINT, many; a file has none, a recording does */
+    double point_m[3], force_N[3];     /* POINT: to the element around it by its shape functions    */
+    double gravity_m_s2[3];            /* GRAVITY                                                  */
+    int n_points;                      /* POINTS: as POINT, many; a file has none, a recording does */
     const double *points_m, *points_N; /* borrowed [n_points][3]                                   */
 } pal_problem_load;
 
