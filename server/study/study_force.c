@@ -1,5 +1,5 @@
-/* The error of the force felt (README.md, "Force"): one scripted press at the ticks of a device, rendered from the
- * models of a configuration's world, against the force of the reference at the same pose.
+/* The error of the force felt (README.md, "How a study is computed"): one scripted press at the ticks of a device,
+ * rendered from the models of a configuration's world, against the force of the reference at the same pose.
  *
  * A round trip delays poses on their way to the world and models on their way back. The world answers a delayed pose by
  * the same motion later, so one run serves every round trip: a model that would be there at t arrives at t + round
@@ -134,13 +134,13 @@ static void render(const pal_study_job *job, const models *m, const pal_study_li
     memset(state, 0, renderer->n_byte);
     for (int k = 0; k < PAL_STUDY_TICKS; k++) {
         const double t = k * PAL_STUDY_HAPTIC_S;
-        double felt_N[3] = {0}, off;
+        double hand_N[3] = {0}, off;
         pal_pose pose;
         for (; next < m->n && m->time_s[next] + link->round_trip_s <= t + 1e-9; next += every)
             renderer->arrive(state, &m->at[next], 1 / link->model_Hz);
         pose_at(&job->press, t, &pose);
-        renderer->tick(state, PAL_STUDY_HAPTIC_S, pose.position_m, pose.velocity_m_s, felt_N);
-        off = pal_dist3(felt_N, job->force_N[k]);
+        renderer->tick(state, PAL_STUDY_HAPTIC_S, pose.position_m, pose.velocity_m_s, hand_N);
+        off = pal_dist3(hand_N, job->force_N[k]);
         sum += off * off;
         *max_N = fmax(*max_N, off);
     }

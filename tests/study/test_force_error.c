@@ -54,7 +54,7 @@ static void nothing_arrives(void *state, const pal_tool *model, double period_s)
     (void)state, (void)model, (void)period_s;
 }
 
-static void nothing_is_felt(void *state, double dt_s, const double x_m[3], const double v_m_s[3], double force_N[3])
+static void nothing_is_rendered(void *state, double dt_s, const double x_m[3], const double v_m_s[3], double force_N[3])
 {
     (void)state, (void)dt_s, (void)x_m, (void)v_m_s;
     pal_set3(force_N, 0, 0, 0);
@@ -73,7 +73,7 @@ static bool run(organ *o, const pal_study_renderer *renderer)
 
 static void who_renders_nothing_is_off_by_all_of_the_force(void)
 {
-    static const pal_study_renderer nothing = {1, nothing_arrives, nothing_is_felt};
+    static const pal_study_renderer nothing = {1, nothing_arrives, nothing_is_rendered};
     organ o;
     int n = 0;
     REQUIRE(run(&o, &nothing));
