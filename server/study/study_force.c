@@ -1,5 +1,5 @@
-/* The error of the force felt (README.md, "How a study is computed"): one scripted press at the ticks of a device,
- * rendered from the models of a configuration's world, against the force of the reference at the same pose.
+/* The error of the force felt (server/study/README.md, "How a study is computed"): one scripted press at the ticks of a
+ * device, rendered from the models of a configuration's world, against the force of the reference at the same pose.
  *
  * A round trip delays poses on their way to the world and models on their way back. The world answers a delayed pose by
  * the same motion later, so one run serves every round trip: a model that would be there at t arrives at t + round
