@@ -429,6 +429,8 @@ int pal_study_configurations(const pal_study *study, pal_measured_configuration 
         const pal_study_point *p = &study->point[order[k]];
         if (!pal_study_measured(p)) continue;
         out[n] = p->measured;
+        const double force = 100 * p->force_rms_N[1] / study->max_force_N;
+        out[n].force_percent = isfinite(force) ? force : 0;
         if (out[n].configuration.step_s == 0) out[n].configuration.step_s = study->step_s;
         n++;
     }
