@@ -222,6 +222,7 @@ typedef struct pal_wire_study_point {
     char label[PAL_WIRE_LABEL_BYTES];   /* for people                                           */
     double cost_ms, error_m;            /* of a step, as the study measured it; largest error    */
     bool pareto_optimal;                /* no other point is both cheaper and more accurate              */
+    double force_percent; /* RMS error of the force of a press over 50 ms of round trip; NaN: not measured */
 } pal_wire_study_point;
 typedef struct pal_wire_study {
     char body[PAL_WIRE_NAME_BYTES];
@@ -252,6 +253,7 @@ typedef struct pal_wire_estimate {
     double max_displacement_m; /* largest displacement then                                              */
     double error_m;            /* largest error of a displacement, of these parts together:              */
     double discretisation_m, algebraic_m, time_m, model_m;
+    double force_percent;           /* error of the force of tools; NaN: none presses          */
     double energy_error_percent;    /* error over solution, in energy                          */
     bool locking;                   /* the estimate is known to be too small                   */
     char diag[PAL_WIRE_TEXT_BYTES]; /* what is not known and why, or ""                        */

@@ -118,13 +118,15 @@ static const pal_control_field ANSWER_fields[] = {{"verb", TEXT, true, ONE(answe
                                                   {"text", TEXT, true, ONE(answer, text)},
                                                   {"args", ARGS, false, LIST(answer, arg, n_arg), NULL},
                                                   {0}};
-static const pal_control_field point_fields[] = {{"index", U32, true, ONE(study_point, index)},
-                                                 {"method", TEXT, true, ONE(study_point, method)},
-                                                 {"label", TEXT, true, ONE(study_point, label)},
-                                                 {"cost_ms", F64, true, ONE(study_point, cost_ms)},
-                                                 {"error_m", F64, true, ONE(study_point, error_m)},
-                                                 {"pareto_optimal", BOOL, false, ONE(study_point, pareto_optimal)},
-                                                 {0}};
+static const pal_control_field point_fields[] = {
+    {"index", U32, true, ONE(study_point, index)},
+    {"method", TEXT, true, ONE(study_point, method)},
+    {"label", TEXT, true, ONE(study_point, label)},
+    {"cost_ms", F64, true, ONE(study_point, cost_ms)},
+    {"error_m", F64, true, ONE(study_point, error_m)},
+    {"force_percent", NUMBER_OR_NAN, false, ONE(study_point, force_percent)},
+    {"pareto_optimal", BOOL, false, ONE(study_point, pareto_optimal)},
+    {0}};
 static const pal_control_field STUDY_fields[] = {{"body", TEXT, true, ONE(study, body)},
                                                  {"step_ms", F64, true, ONE(study, step_ms)},
                                                  {"reference_m", NUMBER_OR_NAN, false, ONE(study, reference_m)},
@@ -153,6 +155,7 @@ static const pal_control_field ESTIMATE_fields[] = {
     {"algebraic_m", NUMBER_OR_NAN, false, ONE(estimate, algebraic_m)},
     {"time_m", NUMBER_OR_NAN, false, ONE(estimate, time_m)},
     {"model_m", NUMBER_OR_NAN, false, ONE(estimate, model_m)},
+    {"force_percent", NUMBER_OR_NAN, false, ONE(estimate, force_percent)},
     {"energy_error_percent", NUMBER_OR_NAN, false, ONE(estimate, energy_error_percent)},
     {"locking", BOOL, false, ONE(estimate, locking)},
     {"diagnostic", TEXT_OR_EMPTY, false, ONE(estimate, diag)},

@@ -61,6 +61,24 @@ static pal_err add_list(job *j, const char *list, bool fit)
     return PAL_ERR_OK;
 }
 
+/* does a list of names hold the name? */
+static bool lists(const char *list, const char *name)
+{
+    char word[256];
+    while (list && pal_flag_next_word(&list, word, sizeof word))
+        if (!strcmp(word, name)) return true;
+    return false;
+}
+
+static pal_err add_touches(job *j)
+{
+    const pal_problem *p = j->set->problem;
+    for (int k = 0; k < p->n_case; k++)
+        if (!lists(j->input->verify, p->load_case[k].id)) PAL_TRY(add_case(j, p->load_case[k].id, true));
+    if (j->set->n > 0) return PAL_ERR_OK;
+    return PAL_REFUSE(j->diag, "--verify: names every touch of the recording, so none is left to fit");
+}
+
 static bool same(double a, double b)
 {
     return fabs(a - b) <= 1e-9 * fabs(b);
@@ -135,8 +153,40 @@ static pal_err read_truth(job *j, int index, const char *path, const char *name)
     return PAL_ERR_OK;
 }
 
+/* the displacement that the recorded body had */
+static pal_err take_recorded(job *j, int index)
+{
+    pal_calibrate_cases *s = j->set;
+    const pal_recorded_load *load = &j->input->recorded->load[s->list[index].load_case - s->problem->load_case];
+    size_t n = 3 * (size_t)load->n_node;
+    if (!(load->speed_1_s < PAL_HELD_MAX_1_S))
+        return PAL_REFUSE(j->diag,
+                          "--truth: recording: \"%s\" at %.2f s moves by %.2g of its displacement in a second, so the "
+                          "recording does not show where its forces lead to: fit to fem, or hold still for longer",
+                          load->id, load->time_s, load->speed_1_s);
+    s->samples[index] = (pal_samples){load->n_node, malloc(n * sizeof(double)), malloc(n * sizeof(double))};
+    if (!s->samples[index].x || !s->samples[index].u)
+        return pal_diagnostic_set(j->diag, PAL_ERR_MEMORY, "no memory for the truth of \"%s\"", load->id);
+    memcpy(s->samples[index].x, load->node_x, n * sizeof(double));
+    memcpy(s->samples[index].u, load->u, n * sizeof(double));
+    s->list[index].samples = &s->samples[index];
+    snprintf(s->truth_name[index], PAL_NAME, "recording");
+    s->list[index].truth_name = s->truth_name[index];
+    return PAL_ERR_OK;
+}
+
+static pal_err choose_recorded_truths(job *j)
+{
+    const char *truth = j->input->truth;
+    if (truth && !is(truth, "fem") && !is(truth, "recording"))
+        return PAL_REFUSE(j->diag, "--truth: \"%.80s\" is not fem or recording, as touches have it", truth);
+    for (int k = 0; k < j->set->n && is(truth, "recording"); k++) PAL_TRY(take_recorded(j, k));
+    return PAL_ERR_OK;
+}
+
 static pal_err choose_truths(job *j)
 {
+    if (j->input->recorded) return choose_recorded_truths(j);
     pal_calibrate_cases *s = j->set;
     const char *truth = j->input->truth;
     bool file = truth && !is(truth, "fem") && !is(truth, "reference");
@@ -245,20 +295,22 @@ pal_err pal_calibrate_cases_read(const pal_calibrate_input *input, pal_calibrate
 {
     *out = (pal_calibrate_cases){0};
     job j = {.input = input, .set = out, .diag = diag};
-    PAL_TRY(pal_problem_read(input->problem, &out->problem, diag));
+    PAL_TRY(input->recorded ? pal_calibrate_recorded_problem(input, &out->problem, &out->surface, diag)
+                            : pal_problem_read(input->problem, &out->problem, diag));
     for (int k = 0; k < out->problem->n_support; k++) {
         const pal_problem_support *s = &out->problem->support[k];
         if (s->moved && (s->move_m[0] != 0 || s->move_m[1] != 0 || s->move_m[2] != 0))
             return PAL_REFUSE(diag, "%s: supports[%d]: moves, springs are calibrated on supports that hold still",
                               out->problem->path, k);
     }
-    PAL_TRY(add_list(&j, input->fit, true));
+    PAL_TRY(input->recorded && !input->fit ? add_touches(&j) : add_list(&j, input->fit, true));
     PAL_TRY(add_list(&j, input->verify, false));
     PAL_TRY(settle_material(&j));
     PAL_TRY(choose_truths(&j));
     pal_mesh_file_options file = {.unit_m = out->problem->unit_m, .weld = PAL_MESH_WELD};
     pal_surface_report report = {0};
-    PAL_TRY(pal_mesh_file_read(out->problem->surface, &file, &out->surface, &report, NULL, NULL, diag));
+    if (!input->recorded)
+        PAL_TRY(pal_mesh_file_read(out->problem->surface, &file, &out->surface, &report, NULL, NULL, diag));
     for (int k = 0; k < out->n; k++)
         if (out->list[k].samples) PAL_TRY(check_box(&j, k));
     return PAL_ERR_OK;

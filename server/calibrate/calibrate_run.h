@@ -3,7 +3,7 @@
 #ifndef PAL_CALIBRATE_CALIBRATE_RUN_H
 #define PAL_CALIBRATE_CALIBRATE_RUN_H
 #include "server/calibrate/calibrate_cases.h"
-#include "server/calibrate/settle.h"
+#include "server/calibrate/release.h"
 #include "server/cli/report.h"
 #include "server/scene/scene_file.h"
 
@@ -18,6 +18,7 @@ typedef struct pal_calibrate_run {
     pal_calibrate_options options;
     pal_fit_options fit;
     bool annealing;
+    const char *from;                      /* path of a recording; NULL: a problem */
     const char *path[PAL_CALIBRATE_FILES]; /* all but the scene's may be NULL */
     /* result */
     pal_calibrate_cases set;
@@ -30,10 +31,12 @@ typedef struct pal_calibrate_run {
     pal_fit_result result;
     double (*trail)[2]; /* error and best so far of every evaluation, per cent; DBL_MAX: no equilibrium [n_trail] */
     int n_trail;
-    bool settled; /* live is valid */
+    double load_share; /* of a recording's forces that is fitted to */
+    bool settled;      /* live is valid */
     pal_settle_report live;
-    double damping_1_s; /* as written to the scene */
-    int n_substep;      /* sub-steps of a step of the scene at rest */
+    pal_release_report release; /* n_run 0: the damping was not looked for in a release */
+    double damping_1_s;         /* as written to the scene */
+    int n_substep;              /* sub-steps of a step of the scene at rest */
     double settle_s, total_s;
 } pal_calibrate_run;
 

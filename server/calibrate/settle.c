@@ -114,9 +114,9 @@ typedef struct climb {
     pal_diagnostic *diag;
 } climb;
 
-/* Runs all loads at one rate, which ends once their mean cannot be the least. *better: settles sooner than all before
- */
-static pal_err try_rung(climb *c, int rung, bool *better)
+/* Runs all loads at one rate, which ends once their mean cannot be the least. seconds: their mean, NaN: not steady.
+ * *better: settles sooner than all before */
+static pal_err try_rate(climb *c, double rate_1_s, bool first, double *seconds, bool *better)
 {
     pal_settle_report *out = c->out;
     pal_settle_run run[PAL_SETTLE_LOADS] = {0};
@@ -124,7 +124,7 @@ static pal_err try_rung(climb *c, int rung, bool *better)
     pal_material material = c->scene->body[0].material;
     double max = c->n_load * (out->steady ? out->seconds : c->options.max_simulated_s), left = max;
     bool steady = true;
-    material.damping_1_s = pal_settle_rates_1_s[rung];
+    material.damping_1_s = rate_1_s;
     PAL_TRY(pal_world_material(c->world, 0, &material, c->diag));
     for (int k = 0; k < c->n_load && steady; k++) {
         options.max_simulated_s = fmin(c->options.max_simulated_s, left);
@@ -132,15 +132,20 @@ static pal_err try_rung(climb *c, int rung, bool *better)
         left -= run[k].seconds;
         steady = run[k].steady;
     }
-    double mean = out->rate_seconds[rung] = steady ? (max - left) / c->n_load : NAN;
+    double mean = *seconds = steady ? (max - left) / c->n_load : NAN;
     *better = steady && (!out->steady || mean < out->seconds);
     /* a body that never rests reports its first run */
-    for (int i = 0; i < c->n_load && (*better || (!out->steady && rung == c->first)); i++) out->load[i] = run[i];
+    for (int i = 0; i < c->n_load && (*better || (!out->steady && first)); i++) out->load[i] = run[i];
     if (!*better) return PAL_ERR_OK;
     out->steady = true;
     out->seconds = mean;
     out->damping_1_s = material.damping_1_s;
     return PAL_ERR_OK;
+}
+
+static pal_err try_rung(climb *c, int rung, bool *better)
+{
+    return try_rate(c, pal_settle_rates_1_s[rung], rung == c->first, &c->out->rate_seconds[rung], better);
 }
 
 /* the rate nearest to 2/T, by the geometric mean of the loads */
@@ -163,6 +168,11 @@ static int first_rung(const climb *c)
 static pal_err run_climb(climb *c)
 {
     bool better, up = false;
+    double seconds;
+    if (c->options.damping_1_s > 0) {
+        c->out->damping_1_s = c->options.damping_1_s;
+        return try_rate(c, c->options.damping_1_s, true, &seconds, &better);
+    }
     c->first = first_rung(c);
     PAL_TRY(try_rung(c, c->first, &better));
     for (int k = c->first + 1; k < PAL_SETTLE_STEPS && c->work > 0; k++) {
@@ -179,35 +189,39 @@ static pal_err run_climb(climb *c)
     return PAL_ERR_OK;
 }
 
+pal_err pal_settle_world(const pal_scene *scene, double damping_1_s, pal_world **out, pal_diagnostic *diag)
+{
+    if (scene->n_body != 1) return PAL_REFUSE(diag, "a scene of %d bodies, wanted one", scene->n_body);
+    pal_scene *own = malloc(sizeof *own);
+    if (!own) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a live body");
+    *own = *scene;
+    own->body[0].output.name[0] = 0;
+    own->body[0].n_effect = 0;
+    /* with a rate the component viscous exists */
+    own->body[0].material.damping_1_s = damping_1_s;
+    own->n_tool = 0;
+    pal_err err = pal_world_create(own, diag, out);
+    free(own);
+    return err;
+}
+
 pal_err pal_settle_damping(const pal_scene *scene, const pal_settle_load *load, int n_load,
                            const pal_settle_options *options, pal_settle_report *out, pal_diagnostic *diag)
 {
     if (n_load < 1 || n_load > PAL_SETTLE_LOADS)
         return PAL_REFUSE(diag, "%d loads, wanted 1 to %d", n_load, PAL_SETTLE_LOADS);
-    if (scene->n_body != 1) return PAL_REFUSE(diag, "a scene of %d bodies, wanted one", scene->n_body);
     *out = (pal_settle_report){.damping_1_s = scene->body[0].material.damping_1_s, .seconds = NAN};
     for (int k = 0; k < PAL_SETTLE_STEPS; k++) out->rate_seconds[k] = NAN;
     for (int k = 0; k < PAL_SETTLE_LOADS; k++) out->load[k].difference_percent = NAN;
-    pal_scene *own = malloc(sizeof *own);
-    pal_world *world = NULL;
-    if (!own) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a live body");
-    *own = *scene;
-    /* no display and no tools; with a rate the component viscous exists */
-    own->body[0].output.name[0] = 0;
-    own->body[0].n_effect = 0;
-    own->body[0].material.damping_1_s = pal_settle_rates_1_s[USUAL];
-    own->n_tool = 0;
-    climb c = {.scene = own,
+    climb c = {.scene = scene,
                .load = load,
                .n_load = n_load,
                .options = *options,
                .work = options->max_work,
                .out = out,
                .diag = diag};
-    pal_err err = pal_world_create(own, diag, &world);
-    c.world = world;
-    if (!err) err = run_climb(&c);
-    pal_world_destroy(world);
-    free(own);
+    PAL_TRY(pal_settle_world(scene, pal_settle_rates_1_s[USUAL], &c.world, diag));
+    pal_err err = run_climb(&c);
+    pal_world_destroy(c.world);
     return err;
 }

@@ -21,6 +21,7 @@ typedef struct pal_settle_load {
 } pal_settle_load;
 
 typedef struct pal_settle_options {
+    double damping_1_s;     /* the only rate to try; 0: the rates above */
     double max_simulated_s; /* simulated time per load; default 60 */
     double max_work;        /* sub-steps times tetrahedra, over all runs; default 1.5e9 (20 s of one core) */
     bool (*progress)(const char *what, double fraction, void *user); /* false: stop; may be NULL */
@@ -35,6 +36,10 @@ typedef struct pal_settle_run {
     double max_m;              /* largest displacement at the end */
     double difference_percent; /* RMS of displacement - u, in per cent of the largest u; NaN: no u */
 } pal_settle_run;
+
+/* Makes a world of a scene of one body with a rate of damping, without display and tools. Errors: REFUSED: a scene
+ * without exactly one body; errors of pal_world_create. */
+pal_err pal_settle_world(const pal_scene *scene, double damping_1_s, pal_world **out, pal_diagnostic *diag);
 
 /* Resets, loads and runs body 0 of a world that was made with damping_1_s > 0. The world keeps its shape and loads.
  * work: in: remaining budget; out: reduced by this run. Errors: STATE: progress returned false; MEMORY. */

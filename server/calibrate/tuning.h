@@ -1,5 +1,5 @@
 /* Tuning constants of calibration. Tests: tests/calibrate/test_equilibrium.c (E), test_calibrate.c (C), test_settle.c
- * (S), tests/house/test_calibrate.sh (H). */
+ * (S), test_recorded_loads.c (R), tests/house/test_calibrate.sh (H). */
 #ifndef PAL_CALIBRATE_TUNING_H
 #define PAL_CALIBRATE_TUNING_H
 
@@ -22,4 +22,27 @@
 #define PAL_SETTLE_MAX_A  1e-2
 #define PAL_SETTLE_MEAN_A 1e-3
 #define PAL_SETTLE_HOLD_S 0.25
+/* touches of a recording: s without a force that end one, as contact may miss a step; share of its largest displacement
+ * above which its stillest moment is looked for; s of the mean of forces there; share of the recording's largest force
+ * below which a touch is no load; 1/s, speed over displacement above which a displacement is not one at rest (R) */
+#define PAL_TOUCH_GAP_S  0.1
+#define PAL_HELD_SHARE   0.8
+#define PAL_HELD_MEAN_S  0.05
+#define PAL_TOUCH_SHARE  0.05
+#define PAL_HELD_MAX_1_S 0.05
+/* releases: s that are compared, at most and at least; share of a touch's largest displacement that must be left when
+ * its force ends, else the tissue followed the hand; longest time whose forces are kept, s; share of the
+ * recording's largest displacement below which the body is at rest when a touch begins; range of damping rates, 1/s,
+ * the number of rates tried first, the relative width of the last interval,
+ * and per cent of a decay curve above which no rate explains the motion (R) */
+#define PAL_RELEASE_S          3.0
+#define PAL_RELEASE_MIN_S      0.2
+#define PAL_RELEASE_SHARE      0.1
+#define PAL_RELEASE_TOUCH_S    20.0
+#define PAL_RELEASE_REST_SHARE 0.02
+#define PAL_RELEASE_LOW_1_S    0.05
+#define PAL_RELEASE_HIGH_1_S   100.0
+#define PAL_RELEASE_RATES      9
+#define PAL_RELEASE_WIDTH      0.01
+#define PAL_RELEASE_PERCENT    5.0
 #endif

@@ -1,13 +1,17 @@
 /* `palpate calibrate`: spring constants whose equilibrium is that of finite elements -> a scene for serve that states
- * its error (paper B section 3). */
+ * its error (paper B section 3). Loads come from a problem or from a recorded hand (recorded_input.h). */
 #include "server/base/clock.h"
 #include "server/base/heap.h"
+#include "server/base/vec3.h"
 #include "server/calibrate/calibrate_run.h"
+#include "server/calibrate/tuning.h"
 #include "server/cli/report.h"
 #include "server/commands/commands.h"
+#include "server/commands/recorded_input.h"
 #include "server/commands/tuning.h"
 #include "server/num/median.h"
 #include "server/scene/json_reader.h"
+#include "server/study/tuning.h"
 
 #include <errno.h>
 #include <float.h>
@@ -22,7 +26,10 @@ static const char about[] =
     "displacements, and writes a scene for palpate serve. PROBLEM.json is that of palpate solve. A name of --case\n"
     "is a load case, whose truth is computed by finite elements, or a reference, whose CSV is the truth. The\n"
     "error is the RMS distance in per cent of the largest displacement of the truth, averaged over the fitted\n"
-    "cases. Ctrl-C ends the search and writes the best result; a second Ctrl-C ends the process.\n";
+    "cases. With --from, the loads are those of a hand: the operand is the scene that was served, RECORDING its log\n"
+    "(palpate serve --record). The touches become load cases, press-1, pull-2 ... in order of time, each in its\n"
+    "stillest moment under a large force, and the damping is that with which the springs return as the recorded body\n"
+    "did after a touch. Ctrl-C ends the search and writes the best result; a second Ctrl-C ends the process.\n";
 
 /* grid: three numbers of 20 characters each fit into the 1 MiB of a scene file */
 enum { MANY_SUBSTEPS = 200, MAX_GRID = 16000 };
@@ -67,7 +74,7 @@ static bool record_step(void *user, const pal_fit_step *step)
 /* NULL: the flags fit together, else the sentence */
 static const char *read_arguments(pal_calibrate_run *run, const arguments *args)
 {
-    if (!run->input.fit || !*run->input.fit) return "--case ID is missing";
+    if (!run->from && (!run->input.fit || !*run->input.fit)) return "--case ID is missing";
     const char *scene = run->path[PAL_CALIBRATE_SCENE];
     if (!scene || !*scene) return "-o SCENE.json is missing";
     const char *wrong = args->grid ? pal_calibrate_grid(args->grid, run->options.grid) : NULL;
@@ -130,7 +137,9 @@ static pal_err check_source(const char *flag, const char *path, const char *sour
 
 static pal_err check_targets(const pal_calibrate_run *run, pal_diagnostic *diag)
 {
+    char folder_scene[PATH_MAX];
     const int *grid = run->options.grid;
+    snprintf(folder_scene, sizeof folder_scene, "%s/scene.json", run->input.problem);
     if ((int64_t)grid[0] * grid[1] * grid[2] > MAX_GRID)
         return PAL_REFUSE(diag, "--grid: %d x %d x %d nodes, more than the %d that a scene file holds", grid[0],
                           grid[1], grid[2], MAX_GRID);
@@ -139,6 +148,8 @@ static pal_err check_targets(const pal_calibrate_run *run, pal_diagnostic *diag)
         PAL_TRY(check_target(target_flag[a], path[a], diag));
         PAL_TRY(check_source(target_flag[a], path[a], run->input.problem, "problem", diag));
         PAL_TRY(check_source(target_flag[a], path[a], run->input.truth, "truth", diag));
+        PAL_TRY(check_source(target_flag[a], path[a], run->from, "recording", diag));
+        PAL_TRY(check_source(target_flag[a], path[a], folder_scene, "scene that was recorded", diag));
         for (int b = 0; b < a && path[a]; b++)
             if (path[b] && is_same_file(path[a], path[b]))
                 return PAL_REFUSE(diag, "%s: %.200s is the file of %s as well", target_flag[a], path[a],
@@ -159,21 +170,47 @@ static pal_err check_sources(const pal_calibrate_run *run, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
-static pal_err search(pal_calibrate_run *run, pal_diagnostic *diag)
+/* springs, truths and their errors at the start */
+static pal_err prepare(pal_calibrate_run *run, pal_diagnostic *diag)
+{
+    enum { ALL = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY };
+    PAL_TRY(pal_calibrate_cases_make(&run->set, &run->options, &run->calibration, &run->info, diag));
+    if (pal_calibration_workspace_create(run->calibration, &run->workspace))
+        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for %d constants", run->info.n_parameter);
+    return pal_calibration_evaluate(run->calibration, run->workspace, run->info.start, ALL, &run->start, NULL, diag);
+}
+
+/* The forces of a moving hand may be more than tissue bears in equilibrium, since inertia and damping bore a part: all
+ * are halved until there is one */
+static pal_err prepare_touches(pal_calibrate_run *run, pal_recorded_loads *loads, pal_diagnostic *diag)
+{
+    run->load_share = 1;
+    for (;; run->load_share /= 2) {
+        pal_err err = prepare(run, diag);
+        bool none = err == PAL_ERR_NUMERIC || (!err && !(run->start.error_percent < DBL_MAX));
+        if (!none || (run->input.truth && !strcmp(run->input.truth, "recording")) ||
+            run->load_share < PAL_MIN_LOAD_SHARE)
+            return err;
+        pal_calibration_workspace_destroy(run->workspace);
+        pal_calibration_destroy(run->calibration);
+        run->workspace = NULL, run->calibration = NULL;
+        pal_recorded_loads_scale(loads, 0.5);
+    }
+}
+
+static pal_err search(pal_calibrate_run *run, pal_recorded_input *recorded, pal_diagnostic *diag)
 {
     enum { ALL = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY };
     run->options.progress = pal_report_continue;
     run->options.user = &run->common;
-    PAL_TRY(pal_calibrate_cases_make(&run->set, &run->options, &run->calibration, &run->info, diag));
+    PAL_TRY(run->from ? prepare_touches(run, &recorded->loads, diag) : prepare(run, diag));
     const pal_calibration *c = run->calibration;
     size_t n = sizeof *run->theta * (size_t)run->info.n_parameter;
     run->theta = malloc(n);
-    if (!run->theta || pal_calibration_workspace_create(c, &run->workspace))
-        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for %d constants", run->info.n_parameter);
+    if (!run->theta) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the constants");
     pal_calibration_manual_start(c, run->theta);
     PAL_TRY(pal_calibration_evaluate(c, run->workspace, run->theta, ALL, &run->hand, NULL, diag));
     memcpy(run->theta, run->info.start, n);
-    PAL_TRY(pal_calibration_evaluate(c, run->workspace, run->theta, ALL, &run->start, NULL, diag));
     run->fit.step = record_step;
     run->fit.user = run;
     pal_err err = run->annealing ? pal_fit_anneal(c, &run->fit, run->theta, &run->result, diag)
@@ -185,6 +222,7 @@ static pal_err search(pal_calibrate_run *run, pal_diagnostic *diag)
 /* runs the springs live: does the body come to rest at the equilibrium of the search, with which damping? */
 static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_diagnostic *diag)
 {
+    const pal_recorded_loads *recorded = run->input.recorded;
     pal_settle_load load[PAL_CALIBRATE_CASES];
     size_t n = 3 * (size_t)run->info.n_node;
     double begin = pal_clock_s(), *u = malloc(n * (size_t)run->set.n * sizeof *u);
@@ -200,8 +238,11 @@ static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_diagn
         bool rests = pal_calibration_displacement(run->calibration, run->workspace, k, u + n * (size_t)k);
         load[k] = (pal_settle_load){.force_N = run->info.force_N[k], .u = rests ? u + n * (size_t)k : NULL};
     }
-    pal_err err = pal_stop_asked() ? PAL_ERR_STATE
-                                   : pal_settle_damping(&scene->scene, load, run->set.n, &options, &run->live, diag);
+    pal_err err = pal_stop_asked() ? PAL_ERR_STATE : PAL_ERR_OK;
+    if (!err && recorded && recorded->has_release)
+        err = pal_release_damping(&scene->scene, &recorded->release, &options, &run->release, diag);
+    if (run->release.fitted) options.damping_1_s = run->release.damping_1_s;
+    if (!err) err = pal_settle_damping(&scene->scene, load, run->set.n, &options, &run->live, diag);
     run->settled = !err;
     run->settle_s = pal_clock_s() - begin;
     free(u);
@@ -221,13 +262,29 @@ static pal_err write_files(const pal_calibrate_run *run, const pal_loaded_scene 
     return PAL_ERR_OK;
 }
 
-static pal_err work(pal_calibrate_run *run, pal_diagnostic *diag)
+/* the scene that was recorded, its touches; unless the user says otherwise with the voxels that it has */
+static pal_err open_recording(pal_calibrate_run *run, pal_recorded_input *recorded, pal_diagnostic *diag)
+{
+    pal_configuration served;
+    if (!run->from) return PAL_ERR_OK;
+    PAL_TRY(pal_recorded_input_open(run->input.problem, run->from, &run->common, recorded, diag));
+    run->input.recorded = &recorded->loads;
+    run->input.scene = recorded->scene.studied.scene;
+    pal_configuration_of(run->input.scene, recorded->loads.body, &served);
+    if (run->options.voxel.resolution == 0) run->options.voxel.resolution = served.size;
+    /* forces on few nodes would be followed best without volume springs, and the body would not bear the next hand */
+    run->options.min_volume_ratio = PAL_MIN_VOLUME_RATIO;
+    return PAL_ERR_OK;
+}
+
+static pal_err work(pal_calibrate_run *run, pal_recorded_input *recorded, pal_diagnostic *diag)
 {
     pal_loaded_scene *scene = NULL;
     PAL_TRY(check_targets(run, diag));
+    PAL_TRY(open_recording(run, recorded, diag));
     PAL_TRY(pal_calibrate_cases_read(&run->input, &run->set, diag));
     PAL_TRY(check_sources(run, diag));
-    PAL_TRY(search(run, diag));
+    PAL_TRY(search(run, recorded, diag));
     PAL_TRY(pal_calibrate_scene(run, &scene, diag));
     pal_err err = settle(run, scene, diag);
     if (!err) {
@@ -317,12 +374,55 @@ static void print_cases(const pal_calibrate_run *run)
     printf("\n");
 }
 
+/* the touch of a case; NULL: the case is of a problem */
+static const pal_recorded_load *touch_of(const pal_calibrate_run *run, int index)
+{
+    const pal_recorded_loads *r = run->input.recorded;
+    return r ? &r->load[run->set.list[index].load_case - run->set.problem->load_case] : NULL;
+}
+
+static void print_touches(const pal_calibrate_run *run)
+{
+    for (int k = 0; k < run->set.n; k++) {
+        const pal_recorded_load *t = touch_of(run, k);
+        if (!t) continue;
+        printf("%s at %.2f s: %.3g N on %d nodes", t->id, t->time_s, pal_norm3(t->total_N), t->n_point);
+        if (t->speed_1_s >= PAL_HELD_MAX_1_S)
+            printf(", while the body moves by %.2g of its displacement a second", t->speed_1_s);
+        printf("\n");
+    }
+    if (run->from && run->load_share < 1)
+        printf("these are %g of the forces of the hand, under which there is no equilibrium\n", run->load_share);
+}
+
+static void print_release(const pal_calibrate_run *run)
+{
+    const pal_recorded_loads *recorded = run->input.recorded;
+    const pal_release_report *r = &run->release;
+    if (!recorded) return;
+    if (r->fitted)
+        printf("release at %.2f s: with damping %.3g 1/s the springs return as recorded, %.2g %% RMS of %.2f s\n",
+               recorded->release.time_s, r->damping_1_s, r->percent, r->seconds);
+    else if (!recorded->has_release)
+        printf("release: none to fit the damping to: %s\n", recorded->no_release);
+    else if (run->settled && r->percent < DBL_MAX)
+        printf("release at %.2f s: the springs return otherwise with any damping, at best %.2g %% RMS of %.2f s\n",
+               recorded->release.time_s, r->percent, r->seconds);
+    else if (run->settled)
+        printf("release: no damping was found before the work allowed was used up\n");
+}
+
 static void print_constants(const pal_calibrate_run *run)
 {
     for (int k = 0; k < run->info.n_kind; k++) {
         if (!run->info.grid) {
+            const bool smallest =
+                run->info.kind[k] == PAL_SPRING_VOLUME && run->options.min_volume_ratio > 0 && ratio_of(run, k) < 1;
             printf("%s %.6g J, %.3g times the start%s\n", pal_calibrate_key(run, k, true), exp(run->theta[k]),
-                   ratio_of(run, k), count_bound(run, k) ? ", as far as --decades lets it go" : "");
+                   ratio_of(run, k),
+                   !count_bound(run, k) ? ""
+                   : smallest           ? ", the smallest with which a body recovers from inversion"
+                                        : ", as far as --decades lets it go");
             continue;
         }
         spread s = spread_of(run, k);
@@ -366,7 +466,9 @@ static void print(const pal_calibrate_run *run)
     if (r->n_rejected > 0) printf(" (%lld without a rest)", (long long)r->n_rejected);
     printf(" and %.2f s\n", r->seconds);
     print_cases(run);
+    print_touches(run);
     print_constants(run);
+    print_release(run);
     print_live(run);
     printf("seconds: prepare %.2f, truth %.2f, search %.2f, live %.2f, total %.2f\n", i->prepare_s, i->truth_s,
            r->seconds, run->settle_s, run->total_s);
@@ -381,18 +483,21 @@ static cJSON *cases_json(const pal_calibrate_run *run)
     cJSON *list = cJSON_CreateArray();
     for (int k = 0; k < run->set.n; k++) {
         const pal_settle_run *live = &run->live.load[k];
-        cJSON_AddItemToArray(
-            list,
-            PAL_JSON({"id", JSON_TEXT(run->set.id[k])}, {"fitted", JSON_BOOL(run->set.list[k].fit)},
-                     {"truth", JSON_TEXT(truth_of(run, k))},
-                     {"kinematics", JSON_TEXT(run->set.list[k].linear ? "linear" : "finite")},
-                     {"start_percent", pal_json_or_null(run->start.case_percent[k])},
-                     {"hand_percent", pal_json_or_null(run->hand.case_percent[k])},
-                     {"percent", pal_json_or_null(run->last.case_percent[k])},
-                     {"most_m", pal_json_or_null(run->info.max_m[k])},
-                     {"points", pal_json_or_null(run->info.n_point[k])},
-                     {"live_s", pal_json_or_null(run->settled && live->steady ? live->seconds : NAN)},
-                     {"live_difference_percent", pal_json_or_null(run->settled ? live->difference_percent : NAN)}));
+        const pal_recorded_load *touch = touch_of(run, k);
+        cJSON *o = PAL_JSON(
+            {"id", JSON_TEXT(run->set.id[k])}, {"fitted", JSON_BOOL(run->set.list[k].fit)},
+            {"truth", JSON_TEXT(truth_of(run, k))},
+            {"kinematics", JSON_TEXT(run->set.list[k].linear ? "linear" : "finite")},
+            {"start_percent", pal_json_or_null(run->start.case_percent[k])},
+            {"hand_percent", pal_json_or_null(run->hand.case_percent[k])},
+            {"percent", pal_json_or_null(run->last.case_percent[k])}, {"most_m", pal_json_or_null(run->info.max_m[k])},
+            {"points", pal_json_or_null(run->info.n_point[k])},
+            {"live_s", pal_json_or_null(run->settled && live->steady ? live->seconds : NAN)},
+            {"live_difference_percent", pal_json_or_null(run->settled ? live->difference_percent : NAN)});
+        if (touch)
+            PAL_JSON_ADD(o, {"time_s", JSON_NUMBER(touch->time_s)}, {"force_N", JSON_NUMBER(pal_norm3(touch->total_N))},
+                         {"speed_1_s", pal_json_or_null(touch->speed_1_s)});
+        cJSON_AddItemToArray(list, o);
     }
     return list;
 }
@@ -429,6 +534,16 @@ static cJSON *live_json(const pal_calibrate_run *run)
                     {"difference_percent", pal_json_or_null(max)}, {"ladder", ladder});
 }
 
+static cJSON *release_json(const pal_calibrate_run *run)
+{
+    const pal_recorded_loads *recorded = run->input.recorded;
+    const pal_release_report *r = &run->release;
+    if (!recorded || !r->fitted) return cJSON_CreateNull();
+    return PAL_JSON({"time_s", JSON_NUMBER(recorded->release.time_s)}, {"seconds", JSON_NUMBER(r->seconds)},
+                    {"damping_1_s", JSON_NUMBER(r->damping_1_s)}, {"percent", JSON_NUMBER(r->percent)},
+                    {"runs", JSON_NUMBER(r->n_run)});
+}
+
 static cJSON *as_json(const pal_calibrate_run *run)
 {
     const pal_calibration_info *i = &run->info;
@@ -459,7 +574,9 @@ static cJSON *as_json(const pal_calibrate_run *run)
                         {"poisson_clamped", JSON_BOOL(i->clamped)}, {"damping_1_s", pal_json_or_null(run->damping_1_s)},
                         {"steady_s", pal_json_or_null(run->settled && run->live.steady ? run->live.seconds : NAN)},
                         {"live", run->settled ? live_json(run) : cJSON_CreateNull()}, {"files", files},
-                        {"seconds", seconds});
+                        {"seconds", seconds}, {"from", run->from ? JSON_TEXT(run->from) : cJSON_CreateNull()},
+                        {"load_share", run->from ? JSON_NUMBER(run->load_share) : cJSON_CreateNull()},
+                        {"release", release_json(run)});
 }
 
 static int start(pal_calibrate_run *run)
@@ -467,13 +584,15 @@ static int start(pal_calibrate_run *run)
     pal_diagnostic diag = {""};
     double begin = pal_clock_s();
     pal_stop_watch();
-    pal_err err = work(run, &diag);
+    pal_recorded_input recorded = {0};
+    pal_err err = work(run, &recorded, &diag);
     run->total_s = pal_clock_s() - begin;
     int code = pal_report_end(&run->common, err, &diag, err || !run->common.json ? NULL : as_json(run));
     if (!err && !run->common.json && !run->common.quiet) print(run);
     pal_calibration_workspace_destroy(run->workspace);
     pal_calibration_destroy(run->calibration);
     pal_calibrate_cases_free(&run->set);
+    pal_recorded_input_close(&recorded);
     free(run->theta);
     free(run->trail);
     return code;
@@ -488,7 +607,10 @@ int command_calibrate(int argc, char **argv)
     pal_calibrate_default(o);
     o->voxel.resolution = 0;
     const pal_flag flag[] = {
-        {"--case", "ID[,ID...]", PAL_FLAG_TEXT, &run.input.fit, 0, 0, "load cases or references to fit"},
+        {"--case", "ID[,ID...]", PAL_FLAG_TEXT, &run.input.fit, 0, 0,
+         "load cases or references to fit (with --from all touches but those of --verify)"},
+        {"--from", "RECORDING", PAL_FLAG_TEXT, &run.from, 0, 0,
+         "log of a session (palpate serve --record) of the scene, whose touches are the load cases"},
         {"--verify", "ID[,ID...]", PAL_FLAG_TEXT, &run.input.verify, 0, 0, "others, whose error is only reported"},
         {"-o", "SCENE.json", PAL_FLAG_TEXT, &run.path[PAL_CALIBRATE_SCENE], 0, 0,
          "scene to write; its mesh is written beside it"},
@@ -505,14 +627,15 @@ int command_calibrate(int argc, char **argv)
         {"--workers", "N", PAL_FLAG_COUNT, &run.fit.n_worker, 1, 256,
          "annealing: threads; the result is the same for any number (one per core)"},
         {"--resolution", "N", PAL_FLAG_COUNT, &o->voxel.resolution, 2, 200,
-         "voxels along the longest axis (the least even number that gives more than 700 nodes)"},
+         "voxels along the longest axis (the least even number that gives more than 700 nodes; with --from the "
+         "scene's)"},
         {"--split", "K", PAL_FLAG_COUNT, &o->split, 1, 8,
          "the finite elements of the truth are K x K x K to a voxel (2)"},
         {"--kinematics", "finite|linear", PAL_FLAG_WORD, &run.input.kinematics, 0, 0,
          "neo-Hookean truth and springs as they move; or both linearised (a reference's, or finite)"},
         {"--truth", "WORD", PAL_FLAG_TEXT, &run.input.truth, 0, 0,
          "fem, reference (the CSV of the reference that belongs to a load case), or a file U.csv of x,y,z,ux,uy,uz\n"
-         "for the one case that is fitted"},
+         "for the one case that is fitted; with --from fem or recording, the displacement that was recorded (fem)"},
         {"--weights", "volume|equal", PAL_FLAG_WORD, &args.weights, 0, 0,
          "springs weighted by the volume around them, or all of a kind equal as in paper B (volume)"},
         {"--area-springs", "on|off", PAL_FLAG_WORD, &args.area, 0, 0,
@@ -530,14 +653,21 @@ int command_calibrate(int argc, char **argv)
         {"--vtk", "FILE", PAL_FLAG_TEXT, &run.path[PAL_CALIBRATE_VTK], 0, 0,
          "write a legacy VTK file with constants and the displacements of truth and springs"},
     };
-    const pal_flag_table table = {.usage = "calibrate PROBLEM.json --case ID -o SCENE.json [flags]",
-                                  .about = about,
-                                  .example = "palpate calibrate deploy/problems/gear.json --case twist --verify push "
-                                             "--resolution 10 --budget 5 -o gear.json\n"
-                                             "palpate calibrate deploy/problems/cube.json --case push --grid 3x3x3 "
-                                             "--resolution 6 --budget 5 --picture cube.svg -o cube.json\n",
-                                  PAL_FLAGS(flag),
-                                  .operands = {1, 1}};
+    const pal_flag_table table = {
+        .usage = "calibrate PROBLEM.json --case ID | SCENE --from RECORDING  -o SCENE.json [flags]",
+        .about = about,
+        .example = "palpate calibrate deploy/problems/gear.json --case twist --verify push "
+                   "--resolution 10 --budget 5 -o gear.json\n"
+                   "palpate calibrate deploy/problems/cube.json --case push --grid 3x3x3 "
+                   "--resolution 6 --budget 5 --picture cube.svg -o cube.json\n"
+                   "palpate prepare --procedural -o organ\n"
+                   "palpate serve organ/scene.json --record pull.log --port 8390 --seconds 6 & "
+                   "sleep 1; palpate-client ws://127.0.0.1:8390/ws --script pull --seconds 4; "
+                   "wait\n"
+                   "palpate calibrate organ/scene.json --from pull.log --resolution 12 --split 1 "
+                   "--budget 10 -o fitted.json\n",
+        PAL_FLAGS(flag),
+        .operands = {1, 1}};
     int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.input.problem, &n);
     if (code >= 0) return code;
     const char *sentence = read_arguments(&run, &args);

@@ -19,6 +19,13 @@ static cJSON *as_json(const pal_replay_report *r, double seconds)
                     {"last_hash", JSON_TEXT(hash)}, {"seconds", JSON_NUMBER(seconds)});
 }
 
+static bool show(void *user, const pal_world *world, double fraction)
+{
+    (void)world;
+    pal_report_progress("replay", fraction, user);
+    return true;
+}
+
 int command_replay(int argc, char **argv)
 {
     const pal_flag_table table = {
@@ -38,9 +45,9 @@ int command_replay(int argc, char **argv)
     pal_diagnostic diag = {""};
     pal_replay_report report;
     double start = pal_clock_s();
-    pal_report_progress("replay", 0, &common);
+    const pal_replay_watch watch = {show, &common};
     pal_err err = pal_scene_input_open(word[1], &input, &diag);
-    if (!err) err = pal_replay_run(word[0], input.studied.scene, &report, &diag);
+    if (!err) err = pal_replay_run(word[0], input.studied.scene, &watch, &report, &diag);
     pal_report_progress(NULL, 0, &common);
     pal_scene_input_close(&input);
     if (err) return pal_report_refusal(&common, err, &diag);

@@ -5,6 +5,9 @@
 /* 1/s: sub-steps times tetrahedra that one core of a 2020s server takes, by which `palpate calibrate` limits the live
  * run after a search of a given time; tests/house/test_calibrate.sh runs with such a limit */
 #define PAL_LIVE_WORK_1_S 7.5e7
+/* smallest share of a recorded hand's forces that `palpate calibrate --from` fits to before it gives up; the pull of
+ * palpate-client takes a half of its own (tests/house/test_calibrate.sh) */
+#define PAL_MIN_LOAD_SHARE 0.1
 /* s: processor time of a node of an adaptive surface with its springs and anchor in one sub-step of rk4 on a 2020s
  * server core; the share of a step that it may take; and how many more nodes than its coarsest level a surface may
  * always have, as a share and a number. `palpate prepare` limits refinement by them; tests/house/test_commands.sh */

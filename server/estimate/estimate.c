@@ -14,6 +14,7 @@ pal_estimate pal_estimate_unknown(void)
                           .algebraic_m = NAN,
                           .time_m = NAN,
                           .model_m = NAN,
+                          .force_percent = NAN,
                           .energy_error_percent = NAN,
                           .ms = NAN};
 }

@@ -24,6 +24,9 @@ typedef struct pal_estimate {
     /* Largest displacement errors, m. NaN: unknown for this body; diag gives the reason. */
     double error_m; /* sum of all parts; NaN: a dominant part is unknown */
     double discretisation_m, algebraic_m, time_m, model_m;
+    /* error of the force that tools exert at their present depth, per cent of it: how much the loads change on the
+     * meshes and with the law that the parts above come from. NaN: nothing presses, or a mesh does not bear it */
+    double force_percent;
     double energy_error_percent; /* energy norm of the error over that of the solution, percent */
     bool locking;                /* nearly incompressible material in elements that lock: the estimate is too small */
     /* median time of a live step over the last second awake; of a body never awake: of separate trial steps */

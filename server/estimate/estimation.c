@@ -36,6 +36,7 @@ struct pal_estimation {
     pal_rest_solution fine, coarse, coarsest, model; /* world NULL: absent */
     pal_display_error shown;                         /* n 0: no displayed vertices, or nodes are used */
     pal_prediction prediction;
+    double left;                   /* what finer meshes change still, over the change from the coarser one */
     pal_estimate_hierarchy family; /* for cut voxels */
     bool measured;                 /* the cost of more nodes is measured, or cannot be */
     double awake_ms;               /* time of a step of a body never seen awake; 0: not measured yet */
@@ -440,13 +441,15 @@ static void discretise(pal_estimation *w, const pal_body *body, pal_estimate *ou
     }
     if (f->known) {
         w->prediction.order = PAL_USUAL_ORDER;
-        out->discretisation_m = last * f->times + skin_off(w);
+        w->left = f->times;
+        out->discretisation_m = last * w->left + skin_off(w);
         return;
     }
     bool early = changes_grow(w, body, last);
     w->prediction.order = early ? PAL_EARLY_ORDER : PAL_USUAL_ORDER;
     if (early) remark(out->diag, "discretisation: still grows from mesh to mesh, so more may be left");
-    out->discretisation_m = last / (exp2(w->prediction.order) - 1) + skin_off(w);
+    w->left = 1 / (exp2(w->prediction.order) - 1);
+    out->discretisation_m = last * w->left + skin_off(w);
 }
 
 /* Springs fitted to converged finite elements are closer to those than to elements on their own voxels. The error
@@ -479,6 +482,16 @@ static void compare_models(pal_estimation *w, const pal_body *body, pal_estimate
         out->model_m = pal_max_dist3(w->model.x, w->fine.x, n);
 }
 
+/* The loads with which the tools would press as far on the limit of the meshes, in shares of the present ones, by the
+ * extrapolation of the discretisation part; the law's change is added. Springs: their own share is 1 */
+static double force_error_percent(const pal_estimation *w)
+{
+    double fine = w->fine.press, limit = fine + w->left * (fine - w->coarse.press);
+    double off = fabs(limit - (w->springs ? 1 : fine));
+    if (w->model.world && isfinite(w->model.press) && !w->springs) off += fabs(w->model.press - fine);
+    return limit > 0 ? 100 * off / limit : (double)NAN;
+}
+
 static bool has_moved(const pal_estimation *w, const pal_estimate *out)
 {
     return out->max_m > PAL_UNMOVED * pal_world_view_body(w->live, 0)->length_scale_m;
@@ -501,6 +514,7 @@ static void find_rests(pal_estimation *w, pal_estimate *out)
     }
     discretise(w, body, out);
     if (!pal_estimate_stopped(w->stop)) compare_models(w, body, out);
+    if (isfinite(out->discretisation_m)) out->force_percent = force_error_percent(w);
 }
 
 /* Without its dominant parts the sum must stay unknown: it would otherwise be compared with complete errors of a

@@ -14,10 +14,10 @@
  *   model           The largest distance between the equilibria of the neo-Hookean law and of the body's own law.
  *                   Springs: between their positions and the equilibrium of finite elements (hex8_bbar, corotational);
  *                   calibrated: to its Richardson limit, with no separate part for discretisation.
- *   time            The steps of the next 0.1 s (at most 12) under constant loads against twice as many of half the
- *                   length, over 1 - 2^-order of the solver.
- *   algebraic       The same steps against a solver with tolerance 1e-9.
- * Distances are taken at the vertices of a displayed skin by element interpolation, and the discretisation part
+ *   force           The loads of tools with which these equilibria are pressed as far, extrapolated like
+ * discretisation. time            The steps of the next 0.1 s (at most 12) under constant loads against twice as many
+ * of half the length, over 1 - 2^-order of the solver. algebraic       The same steps against a solver with tolerance
+ * 1e-9. Distances are taken at the vertices of a displayed skin by element interpolation, and the discretisation part
  * (springs: model) includes the distance of the skin from its elements; without a skin they are taken at nodes. The
  * loads of a haptic tool are scaled until they press equally far (rest_solution.h). All parts are 0 until something has
  * moved by more than 1e-9 of the body's size.

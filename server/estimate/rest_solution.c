@@ -411,6 +411,7 @@ static double pressed_J(const pal_estimate_state *s, const pal_body *body, const
 bool pal_rest_solution_find(pal_rest_solution *r, const pal_estimate_state *state, const pal_body *body,
                             const double *from, const _Atomic bool *stop)
 {
+    r->press = NAN;
     if (!r->world || !find(r, state, body, from, 1, stop)) return false;
     double want_J = pressed_J(state, body, state->x), got_J = pressed_J(state, body, r->x), part = 1, last = 0,
            last_J = 0;
@@ -424,5 +425,6 @@ bool pal_rest_solution_find(pal_rest_solution *r, const pal_estimate_state *stat
         got_J = pressed_J(state, body, r->x);
         if (!(fabs(got_J - want_J) < fabs(last_J - want_J))) return find(r, state, body, from, 1, stop);
     }
+    if (want_J > 0 && fabs(got_J / want_J - 1) <= PAL_SAME_PRESS) r->press = part;
     return true;
 }

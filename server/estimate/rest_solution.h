@@ -18,6 +18,9 @@ typedef struct pal_rest_solution {
     double *x; /* equilibrium positions at the nodes of the running body, m [n_node][3] */
     int n_node;
     bool known; /* x is valid */
+    /* factor of the tools' loads with which they press as far here as in the state: their force on this mesh over the
+     * force in the state; NaN: no tool presses, or none was found */
+    double press;
 } pal_rest_solution;
 
 /* scene: one body, without tools (estimation.c). element, law: NULL keeps those of the model; otherwise the

@@ -38,8 +38,11 @@ static void send_study(pal_client *c, int body)
         if (!isfinite(p->ms) || !isfinite(p->error_m) || (!p->front && room_left == 0)) continue;
         room_left -= !p->front;
         pal_wire_study_point *to = &study->point[study->n_point++];
-        *to = (pal_wire_study_point){
-            .index = (uint32_t)i, .cost_ms = p->ms, .error_m = p->error_m, .pareto_optimal = p->front};
+        *to = (pal_wire_study_point){.index = (uint32_t)i,
+                                     .cost_ms = p->ms,
+                                     .error_m = p->error_m,
+                                     .pareto_optimal = p->front,
+                                     .force_percent = p->force_percent > 0 ? p->force_percent : NAN};
         method_text(&p->configuration, to->method);
         pal_plain_text(to->label, sizeof to->label, pal_configuration_text(&p->configuration, text));
     }
@@ -164,6 +167,7 @@ static void put_estimate(const pal_hub_room *room, const pal_estimate *from, con
     to->discretisation_m = known(from->discretisation_m), to->algebraic_m = known(from->algebraic_m);
     to->time_m = known(from->time_m), to->model_m = known(from->model_m),
     to->energy_error_percent = known(from->energy_error_percent);
+    to->force_percent = known(from->force_percent);
     to->locking = from->locking;
     pal_plain_text(to->diag, sizeof to->diag, from->diag);
     for (int i = 0; i < from->n_neighbour && i < PAL_WIRE_NEIGHBOUR_MAX; i++)
@@ -213,7 +217,7 @@ pal_packet *pal_hub_next_estimate(pal_client *c)
     bool known_ms = awake && c->room->stream->step_ms > 0;
     out->cost_ms = known_ms ? step_cost_ms(c->room, c->room->stream->step_ms, now.step_s) : NAN;
     out->age_s = out->max_displacement_m = out->error_m = out->discretisation_m = out->algebraic_m = out->time_m =
-        out->model_m = out->energy_error_percent = NAN;
+        out->model_m = out->force_percent = out->energy_error_percent = NAN;
     if (pal_session_estimate(c->room->session, b, &estimate)) put_estimate(c->room, &estimate, &now, out);
     report_far(c->room, out);
     return pal_hub_encode(c->hub);

@@ -65,7 +65,7 @@ static pal_err apply(pal_world *world, const pal_scene *scene, const pal_input_r
 }
 
 static pal_err run(const char *name, const uint8_t *bytes, size_t n_byte, const pal_scene *scene, pal_world *world,
-                   pal_replay_report *report, pal_diagnostic *diag)
+                   const pal_replay_watch *watch, pal_replay_report *report, pal_diagnostic *diag)
 {
     pal_input_header header;
     pal_input_record record = {.kind = PAL_INPUT_RESET};
@@ -79,6 +79,9 @@ static pal_err run(const char *name, const uint8_t *bytes, size_t n_byte, const 
             if (err && err != PAL_ERR_FROZEN)
                 return pal_diagnostic_set(diag, err, "%s: step %llu: %s", name, (unsigned long long)report->n_tick,
                                           pal_err_text(err));
+            if (watch && !watch->step(watch->user, world, (double)at / (double)n_byte))
+                return pal_diagnostic_set(diag, PAL_ERR_STATE, "%s: stopped at step %llu", name,
+                                          (unsigned long long)report->n_tick);
         }
         PAL_TRY(apply(world, scene, &record, report, diag));
     }
@@ -86,7 +89,7 @@ static pal_err run(const char *name, const uint8_t *bytes, size_t n_byte, const 
 }
 
 pal_err pal_replay_parse(const char *name, const uint8_t *bytes, size_t n_byte, const pal_scene *scene,
-                         pal_replay_report *out, pal_diagnostic *diag)
+                         const pal_replay_watch *watch, pal_replay_report *out, pal_diagnostic *diag)
 {
     pal_input_header header;
     pal_replay_report report = {.first_difference = UINT64_MAX};
@@ -100,7 +103,7 @@ pal_err pal_replay_parse(const char *name, const uint8_t *bytes, size_t n_byte, 
                               name);
         pal_world *world;
         PAL_TRY(pal_world_create(scene, diag, &world));
-        pal_err err = run(name, bytes, n_byte, scene, world, &report, diag);
+        pal_err err = run(name, bytes, n_byte, scene, world, watch, &report, diag);
         pal_world_destroy(world);
         PAL_TRY(err);
     }
@@ -108,12 +111,13 @@ pal_err pal_replay_parse(const char *name, const uint8_t *bytes, size_t n_byte, 
     return PAL_ERR_OK;
 }
 
-pal_err pal_replay_run(const char *path, const pal_scene *scene, pal_replay_report *out, pal_diagnostic *diag)
+pal_err pal_replay_run(const char *path, const pal_scene *scene, const pal_replay_watch *watch, pal_replay_report *out,
+                       pal_diagnostic *diag)
 {
     uint8_t *bytes;
     size_t n_byte;
     PAL_TRY(pal_file_read(path, PAL_REPLAY_BYTES_MAX, &bytes, &n_byte, diag));
-    pal_err err = pal_replay_parse(path, bytes, n_byte, scene, out, diag);
+    pal_err err = pal_replay_parse(path, bytes, n_byte, scene, watch, out, diag);
     free(bytes);
     return err;
 }

@@ -15,11 +15,18 @@ typedef struct pal_replay_report {
 /* size limit of a log: 1 GiB, about 10 h of eight busy tools */
 #define PAL_REPLAY_BYTES_MAX ((size_t)1 << 30)
 
+/* sees the world of a replay: after every step and before the next input. fraction: of the log's bytes. false: stop */
+typedef struct pal_replay_watch {
+    bool (*step)(void *user, const pal_world *world, double fraction);
+    void *user;
+} pal_replay_watch;
+
 /* Runs the log at path against a world of this scene. A different hash is not an error; the report gives it. REFUSED:
- * not a log, truncated, of another scene, or records were dropped while it was written; IO; MEMORY; errors of
- * pal_world_create. */
-pal_err pal_replay_run(const char *path, const pal_scene *scene, pal_replay_report *out, pal_diagnostic *diag);
+ * not a log, truncated, of another scene, or records were dropped while it was written; STATE: the watch stopped it;
+ * IO; MEMORY; errors of pal_world_create. watch may be NULL. */
+pal_err pal_replay_run(const char *path, const pal_scene *scene, const pal_replay_watch *watch, pal_replay_report *out,
+                       pal_diagnostic *diag);
 /* the same from memory; name appears in diagnostics; scene NULL: only checks that the log is complete */
 pal_err pal_replay_parse(const char *name, const uint8_t *bytes, size_t n_byte, const pal_scene *scene,
-                         pal_replay_report *out, pal_diagnostic *diag);
+                         const pal_replay_watch *watch, pal_replay_report *out, pal_diagnostic *diag);
 #endif

@@ -15,6 +15,7 @@
 #include "server/num/shape_functions.h"
 #include "server/sim/core/configuration.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -147,6 +148,17 @@ int pal_case_shape_functions(const pal_body *body, int element, const double loc
     return n_corner;
 }
 
+void pal_case_clamp(int n_corner, double local[4])
+{
+    double sum = 0;
+    if (n_corner == PAL_HEX_CORNERS) {
+        for (int c = 0; c < 3; c++) local[c] = fmax(-1, fmin(local[c], 1));
+        return;
+    }
+    for (int c = 0; c < 4; c++) sum += local[c] = fmax(0, local[c]);
+    for (int c = 0; c < 4; c++) local[c] /= sum;
+}
+
 typedef struct job {
     const pal_problem *problem;
     const pal_problem_case *load_case;
@@ -215,18 +227,31 @@ static pal_err add_traction(const job *j, double *area_m2)
     return PAL_ERR_OK;
 }
 
-static pal_err add_point(const job *j)
+static pal_err add_point(const job *j, const double point_m[3], const double force_N[3])
 {
-    const pal_problem_load *load = &j->load_case->load[j->index];
     double x[3], local[4], outside;
-    pal_sub3(x, load->point_m, j->body->tets->origin_m);
+    pal_sub3(x, point_m, j->body->tets->origin_m);
     int element = pal_locate_point(j->locate, x, local, &outside);
     if (outside > j->body->edge_m)
         return PAL_REFUSE(j->diag, "%s: the point (%g, %g, %g) lies %g m outside the body, more than a voxel (%g m)",
-                          path_of(j).text, load->point_m[0], load->point_m[1], load->point_m[2], outside,
-                          j->body->edge_m);
-    spread(j, element, local, load->force_N);
+                          path_of(j).text, point_m[0], point_m[1], point_m[2], outside, j->body->edge_m);
+    spread(j, element, local, force_N);
     return PAL_ERR_OK;
+}
+
+/* Points of a recorded mesh: nodes of its voxels lie outside of the surface by up to their edge, and so outside of
+ * another mesh. */
+static void add_points(const job *j)
+{
+    const pal_problem_load *load = &j->load_case->load[j->index];
+    const int n_corner = j->body->element ? j->body->n_corner : PAL_TET_CORNERS;
+    for (int i = 0; i < load->n_points; i++) {
+        double x[3], local[4];
+        pal_sub3(x, load->points_m + 3 * (size_t)i, j->body->tets->origin_m);
+        int element = pal_locate_point(j->locate, x, local, NULL);
+        pal_case_clamp(n_corner, local);
+        spread(j, element, local, load->points_N + 3 * (size_t)i);
+    }
 }
 
 pal_err pal_case_forces(const pal_problem *problem, const pal_problem_case *load_case, int load, const pal_body *body,
@@ -238,8 +263,9 @@ pal_err pal_case_forces(const pal_problem *problem, const pal_problem_case *load
         const job j = {problem, load_case, k, body, locate, surface, force_N, diag};
         if (load >= 0 && k != load) continue;
         if (l->kind == PAL_LOAD_TRACTION) PAL_TRY(add_traction(&j, area_m2));
-        if (l->kind == PAL_LOAD_POINT) PAL_TRY(add_point(&j));
-        if (l->kind == PAL_LOAD_TRACTION || l->kind == PAL_LOAD_POINT) continue;
+        if (l->kind == PAL_LOAD_POINT) PAL_TRY(add_point(&j, l->point_m, l->force_N));
+        if (l->kind == PAL_LOAD_POINTS) add_points(&j);
+        if (l->kind != PAL_LOAD_GRAVITY) continue;
         for (int i = 0; i < body->n_node; i++) pal_axpy3(force_N + 3 * i, body->mass_kg[i], l->gravity_m_s2);
     }
     return PAL_ERR_OK;

@@ -48,6 +48,9 @@ pal_err pal_case_forces(const pal_problem *problem, const pal_problem_case *load
                         const pal_locate *locate, const pal_surface *surface, double *force_N, double *area_m2,
                         pal_diagnostic *diag);
 
+/* Moves local coordinates of pal_locate_point into the element of n_corner corners, so that a force on a point outside
+ * is not extrapolated. */
+void pal_case_clamp(int n_corner, double local[4]);
 /* Shape functions of an element of a body at local coordinates of pal_locate_point. Returns the number of corners;
  * *node points to their nodes. */
 int pal_case_shape_functions(const pal_body *body, int element, const double local[4], double shape[10],

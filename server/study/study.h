@@ -13,12 +13,20 @@
 #define PAL_STUDY_STUDY_H
 #include "server/sim/core/configuration.h"
 #include "server/sim/core/problem.h"
+#include "server/sim/core/tools.h"
 #include "server/solve/sample_points.h"
 
 #include <math.h>
 #include <stdint.h>
 
-enum { PAL_STUDY_POINTS = 256, PAL_STUDY_LOADS = 4 };
+enum { PAL_STUDY_POINTS = 256, PAL_STUDY_LOADS = 4, PAL_STUDY_FORCES = 4 };
+
+/* How a haptic device is connected: models a second, and s from a pose to the model that answers it. The study judges
+ * the force felt over each of: 60 Hz with 0, 50 and 200 ms, 30 Hz with 50 ms. */
+typedef struct pal_study_link {
+    double model_Hz, round_trip_s;
+} pal_study_link;
+extern const pal_study_link pal_study_links[PAL_STUDY_FORCES];
 
 typedef struct pal_study_point {
     pal_measured_configuration
@@ -30,8 +38,11 @@ typedef struct pal_study_point {
     /* over all probes and loads; divide by max_m for the share of the largest displacement */
     double static_rms_m, static_max_m;
     double trajectory_rms_m, trajectory_max_m; /* over time, of the point that the first load moves most */
-    double prepare_s;                          /* mesh and world */
-    double n_element;                          /* finite elements; 0: none, or not recorded */
+    /* difference of the force felt over each link from that of the reference in the scripted press, rms and largest
+     * over its ticks; divide by max_force_N for the share of the largest force. NaN: not measured */
+    double force_rms_N[PAL_STUDY_FORCES], force_max_N[PAL_STUDY_FORCES];
+    double prepare_s; /* mesh and world */
+    double n_element; /* finite elements; 0: none, or not recorded */
     /* time to read its solver's factor forwards and backwards, at this machine's read rate for data of the size of
      * its world; known before it runs; 0: no factor */
     double read_ms;
@@ -41,11 +52,14 @@ typedef struct pal_study_point {
 } pal_study_point;
 
 typedef struct pal_study {
-    char name[PAL_NAME];   /* of the scene or problem */
-    char machine[128];     /* processor and cores, as the system names them */
-    char reference[160];   /* description of how the reference was made */
-    double reference_m;    /* its estimated error */
-    double max_m;          /* largest displacement of the reference */
+    char name[PAL_NAME]; /* of the scene or problem */
+    char machine[128];   /* processor and cores, as the system names them */
+    char reference[160]; /* description of how the reference was made */
+    double reference_m;  /* its estimated error */
+    double max_m;        /* largest displacement of the reference */
+    double max_force_N;  /* largest force of the reference in the scripted press; NaN: none was made */
+    double
+        reference_force_N; /* rms change of that force from the reference on a mesh 1.42 times coarser; NaN: likewise */
     double length_scale_m; /* box diagonal of the body */
     double step_s;         /* of the scene, the bound for "real time" */
     int n_point;
@@ -59,14 +73,26 @@ typedef struct pal_study_answer {
     char reason[PAL_CONFIGURATION_TEXT];
 } pal_study_answer;
 
+/* How a device renders between models, so that a study judges the force that a hand feels. All functions are pure but
+ * for `state`. */
+typedef struct pal_study_renderer {
+    size_t n_byte; /* of the state, zero at the start */
+    /* a model arrives, as the world wrote it for the tool (patches, grasp, requested pose); period_s: usual time
+     * between two */
+    void (*arrive)(void *state, const pal_tool *model, double period_s);
+    /* one tick: force on the hand at a position of the tool, scene frame */
+    void (*tick)(void *state, double dt_s, const double x_m[3], const double v_m_s[3], double force_N[3]);
+} pal_study_renderer;
+
 typedef struct pal_study_options {
     const char *const
         *method; /* models to sweep [n_method]; 0: all that apply; "tet_springs" is also swept calibrated */
     int n_method;
-    int body;                   /* index in the scene */
-    double seconds;             /* duration of the dynamic run; 0: 0.5 */
-    int quick;                  /* 1: few configurations and a coarser reference, for tests and CI */
-    const pal_samples *samples; /* static reference of the first load; NULL: computed here */
+    int body;                           /* index in the scene */
+    double seconds;                     /* duration of the dynamic run; 0: 0.5 */
+    int quick;                          /* 1: few configurations and a coarser reference, for tests and CI */
+    const pal_study_renderer *renderer; /* borrowed; NULL: forces are not judged */
+    const pal_samples *samples;         /* static reference of the first load; NULL: computed here */
     /* Points of an interrupted run; reused, not measured again. NULL: none. */
     const pal_study *before;
     /* [load] Cache of reference answers, under a hash of configuration, load and points; answers of the same body,

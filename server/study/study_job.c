@@ -16,7 +16,7 @@ enum { SCENE_VOXELS = 16, FINEST_SCENE = 64, COARSE = 10, SOFTER = 3 };
 static void free_job(pal_study_job *job)
 {
     for (int k = 0; k < PAL_STUDY_LOADS; k++) free(job->static_u[k]);
-    PAL_FREE(job->probe, job->now, job->trajectory, job->own_trajectory, job->scene, job->problem);
+    PAL_FREE(job->probe, job->now, job->trajectory, job->own_trajectory, job->force_N, job->scene, job->problem);
 }
 
 bool pal_study_continues(const pal_study_job *job)
@@ -35,6 +35,7 @@ static pal_err allocate(pal_study_job *job, int n_probe)
     job->n_trajectory = (int)fmax(1, floor(job->seconds / PAL_STUDY_FRAME_S + 1e-9));
     PAL_ZEROED(&err, job->trajectory, job->n_trajectory);
     PAL_ZEROED(&err, job->own_trajectory, job->n_trajectory);
+    PAL_ZEROED(&err, job->force_N, PAL_STUDY_TICKS);
     return err ? pal_diagnostic_set(job->diag, err, "no memory for a study") : PAL_ERR_OK;
 }
 
@@ -127,6 +128,7 @@ static pal_err study(pal_study_job *job)
         pal_study *to = job->out;
         memcpy(to->reference, before->reference, sizeof to->reference);
         to->reference_m = before->reference_m, to->max_m = before->max_m, to->length_scale_m = before->length_scale_m;
+        to->max_force_N = before->max_force_N, to->reference_force_N = before->reference_force_N;
     }
     if (!err && !whole) err = choose_probes(job);
     if (!err && !whole) err = job->n_load == 0 ? press(job) : pal_study_reference(job);
@@ -160,6 +162,7 @@ static pal_err begin(pal_study_job *job, const pal_scene *scene, int body)
     pal_study *out = job->out;
     const pal_study_options *o = job->options;
     memset(out, 0, sizeof *out);
+    out->max_force_N = out->reference_force_N = NAN;
     if (body < 0 || body >= scene->n_body)
         return PAL_REFUSE(job->diag, "body %d: the scene has %d", body, scene->n_body);
     if (!(o->seconds >= 0 && o->seconds <= 60))

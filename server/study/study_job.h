@@ -5,7 +5,14 @@
 #include "server/sim/world/world.h"
 #include "server/study/study.h"
 
-enum { PAL_STUDY_PROBES = 1000 };
+/* points; ticks of the scripted press, PAL_FORCE_S / PAL_STUDY_HAPTIC_S */
+enum { PAL_STUDY_PROBES = 1000, PAL_STUDY_TICKS = 2000 };
+
+/* the scripted press: where the surface is touched at rest, body frame */
+typedef struct pal_study_press {
+    bool is_placed; /* false: the surface has no direction there */
+    double at_m[3], inward[3], radius_m, depth_m;
+} pal_study_press;
 
 /* a configuration to measure */
 typedef struct pal_study_entry {
@@ -53,6 +60,8 @@ typedef struct pal_study_job {
     double (*trajectory)[3];     /* displacement of the tip, every PAL_STUDY_FRAME_S [n_trajectory] */
     double (*own_trajectory)[3]; /* scratch [n_trajectory] */
     double seconds;
+    pal_study_press press;
+    double (*force_N)[3]; /* of the reference at every tick of the press [PAL_STUDY_TICKS] */
     pal_study_rest rest;
     int reference, n_reference; /* its size, its nodes */
     double box_m[3];            /* side lengths if the body fills its box; else 0 */
@@ -107,6 +116,17 @@ pal_err pal_study_fit(pal_study_job *job, pal_configuration *configuration, pal_
 /* study_reference.c. Call reference_size first: the sweep depends on it. */
 pal_err pal_study_reference_size(pal_study_job *job);
 pal_err pal_study_reference(pal_study_job *job);
+
+/* study_force.c. The press stands on the probe that the first load moves most. */
+void pal_study_place_press(pal_study_job *job);
+/* Force of a configuration on the tool at every tick of the press [PAL_STUDY_TICKS], without delay. */
+pal_err pal_study_press_force(pal_study_job *job, const pal_configuration *configuration, double (*force_N)[3],
+                              pal_diagnostic *diag);
+/* Errors of the force felt; NaN where the press cannot be followed. Errors: STATE, MEMORY. */
+pal_err pal_study_measure_force(pal_study_job *job, pal_study_point *out);
+void pal_study_forget_forces(pal_study_point *out); /* all NaN */
+/* study_loads.c: mean inward direction of the triangles with a corner within `half` of a point; 0: they cancel */
+void pal_study_inward(const pal_surface *surface, const double at[3], double half, double out[3]);
 
 /* study_run.c: measures one point, whose configuration and errors are set. Only STATE is an error. */
 pal_err pal_study_measure(pal_study_job *job, const pal_study_entry *entry, pal_study_point *out);

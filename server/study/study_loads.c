@@ -42,8 +42,7 @@ static pal_err choose_press_points(const pal_study_job *job, const pal_study_wor
     return PAL_ERR_OK;
 }
 
-/* inward direction, from the triangles with a corner in the loaded area */
-static void inward(const pal_surface *s, const double at[3], double half, double out[3])
+void pal_study_inward(const pal_surface *s, const double at[3], double half, double out[3])
 {
     double sum[3] = {0, 0, 0};
     for (int t = 0; t < s->n_tri; t++) {
@@ -78,7 +77,7 @@ static void place_load(pal_study_job *job, int index, const pal_surface *s, cons
 {
     pal_problem_case *c = &job->problem->load_case[index];
     double n[3], low[3];
-    inward(s, at, 1.5 * half, n);
+    pal_study_inward(s, at, 1.5 * half, n);
     /* a fold in the surface: points away from the body's centre */
     if (!(pal_norm3(n) > 0)) {
         double size = diagonal(s, low);

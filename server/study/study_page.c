@@ -20,6 +20,8 @@ static bool is_quick(const pal_study_file *file)
 /* ---- table ---- */
 
 typedef enum column_kind { NUMBER, COUNT, LIVE } column_kind;
+/* what a number is divided by: the largest displacement, the largest force */
+typedef enum column_of { ITSELF, DISPLACEMENT, FORCE } column_of;
 /* a column of figures; printed: heading and width on the terminal, 0: on the page only */
 typedef struct column {
     const char *name, *printed;
@@ -27,26 +29,34 @@ typedef struct column {
     column_kind kind;
     size_t at;
     double scale;
-    bool of_max; /* per cent of the largest displacement */
+    column_of of;
     const char *format;
 } column;
 #define AT(member) offsetof(pal_study_point, member)
 static const column columns[] = {
-    {"ms", "ms", 8, NUMBER, AT(measured.ms), 1, false, "%.3f"},
-    {"ms p95", "p95", 8, NUMBER, AT(ms_p95), 1, false, "%.3f"},
-    {"live", "live", 5, LIVE, 0, 1, false, ""},
-    {"error mm", "", 0, NUMBER, AT(measured.error_m), 1e3, false, "%.4f"},
-    {"rest RMS mm", "rest RMS", 9, NUMBER, AT(static_rms_m), 1e3, false, "%.4f"},
-    {"rest mm", "max mm", 9, NUMBER, AT(static_max_m), 1e3, false, "%.4f"},
-    {"rest RMS %", "RMS %", 7, NUMBER, AT(static_rms_m), 1e2, true, "%.2f"},
-    {"rest %", "max %", 7, NUMBER, AT(static_max_m), 1e2, true, "%.2f"},
-    {"path RMS mm", "", 0, NUMBER, AT(trajectory_rms_m), 1e3, false, "%.4f"},
-    {"path mm", "path mm", 9, NUMBER, AT(trajectory_max_m), 1e3, false, "%.4f"},
-    {"nodes", "nodes", 8, COUNT, AT(n_node), 1, false, "%.0f"},
-    {"sub-steps", "steps", 6, COUNT, AT(n_substep), 1, false, "%.0f"},
-    {"made in s", "", 0, NUMBER, AT(prepare_s), 1, false, "%.2f"},
-    {"predicted ms", "", 0, NUMBER, AT(predicted_ms), 1, false, "%.3f"},
-    {"predicted mm", "", 0, NUMBER, AT(predicted_m), 1e3, false, "%.4f"},
+    {"ms", "ms", 8, NUMBER, AT(measured.ms), 1, ITSELF, "%.3f"},
+    {"ms p95", "p95", 8, NUMBER, AT(ms_p95), 1, ITSELF, "%.3f"},
+    {"live", "live", 5, LIVE, 0, 1, ITSELF, ""},
+    {"error mm", "", 0, NUMBER, AT(measured.error_m), 1e3, ITSELF, "%.4f"},
+    {"rest RMS mm", "rest RMS", 9, NUMBER, AT(static_rms_m), 1e3, ITSELF, "%.4f"},
+    {"rest mm", "max mm", 9, NUMBER, AT(static_max_m), 1e3, ITSELF, "%.4f"},
+    {"rest RMS %", "RMS %", 7, NUMBER, AT(static_rms_m), 1e2, DISPLACEMENT, "%.2f"},
+    {"rest %", "max %", 7, NUMBER, AT(static_max_m), 1e2, DISPLACEMENT, "%.2f"},
+    {"path RMS mm", "", 0, NUMBER, AT(trajectory_rms_m), 1e3, ITSELF, "%.4f"},
+    {"path mm", "path mm", 9, NUMBER, AT(trajectory_max_m), 1e3, ITSELF, "%.4f"},
+    {"force 0 ms RMS %", "F0 %", 6, NUMBER, AT(force_rms_N[0]), 1e2, FORCE, "%.1f"},
+    {"force 0 ms %", "", 0, NUMBER, AT(force_max_N[0]), 1e2, FORCE, "%.1f"},
+    {"force 50 ms RMS %", "F50 %", 6, NUMBER, AT(force_rms_N[1]), 1e2, FORCE, "%.1f"},
+    {"force 50 ms %", "", 0, NUMBER, AT(force_max_N[1]), 1e2, FORCE, "%.1f"},
+    {"force 200 ms RMS %", "F200 %", 6, NUMBER, AT(force_rms_N[2]), 1e2, FORCE, "%.1f"},
+    {"force 200 ms %", "", 0, NUMBER, AT(force_max_N[2]), 1e2, FORCE, "%.1f"},
+    {"force 50 ms, 30 Hz RMS %", "", 0, NUMBER, AT(force_rms_N[3]), 1e2, FORCE, "%.1f"},
+    {"force 50 ms, 30 Hz %", "", 0, NUMBER, AT(force_max_N[3]), 1e2, FORCE, "%.1f"},
+    {"nodes", "nodes", 8, COUNT, AT(n_node), 1, ITSELF, "%.0f"},
+    {"sub-steps", "steps", 6, COUNT, AT(n_substep), 1, ITSELF, "%.0f"},
+    {"made in s", "", 0, NUMBER, AT(prepare_s), 1, ITSELF, "%.2f"},
+    {"predicted ms", "", 0, NUMBER, AT(predicted_ms), 1, ITSELF, "%.3f"},
+    {"predicted mm", "", 0, NUMBER, AT(predicted_m), 1e3, ITSELF, "%.4f"},
 };
 enum { N_COLUMN = sizeof columns / sizeof *columns };
 
@@ -57,7 +67,8 @@ static const char *cell_text(const pal_study *s, const pal_study_point *p, const
     const void *at = (const char *)p + c->at;
     if (c->kind == LIVE) return !pal_study_measured(p) ? "" : 1e-3 * p->measured.ms <= s->step_s ? "yes" : "no";
     double value = c->scale * (c->kind == COUNT ? *(const int *)at : *(const double *)at);
-    if (c->of_max) value /= s->max_m;
+    if (c->of == DISPLACEMENT) value /= s->max_m;
+    if (c->of == FORCE) value /= s->max_force_N;
     if (!isfinite(value)) return unknown;
     snprintf(out, 32, c->format, value);
     return out;
@@ -104,6 +115,12 @@ void pal_study_print(const pal_study_file *file, FILE *to)
             "ms: for %.3g ms of the body's time, with shorter steps so many of them.\n"
             "Live: no more than that. Steps: sub-steps of one.\n",
             1e3 * s->step_s);
+    if (s->max_force_N > 0)
+        fprintf(to,
+                "F: difference of the force felt in a press from the reference's, RMS in per cent of its largest, %.3g "
+                "N, with 60 models a second and 0, 50 and 200 ms of round trip. The reference's own changes by %.2g %% "
+                "from a mesh 1.4 times coarser.\n",
+                s->max_force_N, 100 * s->reference_force_N / s->max_force_N);
     for (int k = 0; k < s->n_point; k++) {
         const pal_study_point *p = &s->point[order[k]];
         if (!pal_study_measured(p))
@@ -164,7 +181,15 @@ typedef struct series {
     double usual; /* tolerance that labels omit */
 } series;
 
-static void add_point(series *s, const pal_study *study, const pal_study_point *p)
+enum { FORCE_LINK = 1 }; /* of the force plot: 60 Hz, 50 ms */
+
+static double force_percent(const pal_study *study, const pal_study_point *p, int link)
+{
+    return 100 * p->force_rms_N[link] / study->max_force_N;
+}
+
+/* of: DISPLACEMENT or FORCE */
+static void add_point(series *s, const pal_study *study, const pal_study_point *p, column_of of)
 {
     char name[PAL_CONFIGURATION_TEXT];
     int k = 0;
@@ -181,11 +206,15 @@ static void add_point(series *s, const pal_study *study, const pal_study_point *
     }
     char *tip = s->tip_text[s->n_tip++], text[PAL_CONFIGURATION_TEXT];
     const double ms = p->measured.ms, error_mm = 1e3 * p->measured.error_m;
-    snprintf(tip, TIP, "%s: %.3g ms, %.3g mm%s%s", pal_configuration_text(c, text), ms, error_mm, apart ? "; " : "",
-             p->reason);
+    if (of == FORCE)
+        snprintf(tip, TIP, "%s: %.3g ms, force %.3g, %.3g, %.3g %% at 0, 50, 200 ms", pal_configuration_text(c, text),
+                 ms, force_percent(study, p, 0), force_percent(study, p, 1), force_percent(study, p, 2));
+    else
+        snprintf(tip, TIP, "%s: %.3g ms, %.3g mm%s%s", pal_configuration_text(c, text), ms, error_mm, apart ? "; " : "",
+                 p->reason);
     s->tip[k][s->n[k]] = tip;
-    s->x[k][s->n[k]] = ms, s->y[k][s->n[k]++] = error_mm;
-    if (!p->measured.front) return;
+    s->x[k][s->n[k]] = ms, s->y[k][s->n[k]++] = of == FORCE ? force_percent(study, p, FORCE_LINK) : error_mm;
+    if (!p->measured.front || of == FORCE) return;
     s->front_x[s->n_front] = ms, s->front_y[s->n_front++] = error_mm;
     if (s->n_label == FRONT_LABELS) return;
     parameters_of(study, p, s->usual, s->parameters[s->n_label], sizeof *s->parameters);
@@ -193,7 +222,8 @@ static void add_point(series *s, const pal_study *study, const pal_study_point *
     s->n_label++;
 }
 
-static pal_err draw(const pal_study_file *file, char **svg, size_t *n_byte, pal_diagnostic *diag)
+/* the error of the displacement, or of the force, against milliseconds */
+static pal_err draw(const pal_study_file *file, column_of of, char **svg, size_t *n_byte, pal_diagnostic *diag)
 {
     const pal_study *study = &file->study;
     int order[PAL_STUDY_POINTS];
@@ -202,7 +232,9 @@ static pal_err draw(const pal_study_file *file, char **svg, size_t *n_byte, pal_
     pal_study_order(study, order);
     s->usual = usual_tolerance(study);
     for (int k = 0; k < study->n_point; k++)
-        if (pal_study_measured(&study->point[order[k]])) add_point(s, study, &study->point[order[k]]);
+        if (pal_study_measured(&study->point[order[k]]) &&
+            (of != FORCE || isfinite(force_percent(study, &study->point[order[k]], FORCE_LINK))))
+            add_point(s, study, &study->point[order[k]], of);
     snprintf(s->title, sizeof s->title, "%s: what accuracy costs", study->name);
     snprintf(s->live, sizeof s->live, "real time, %.3g ms", 1e3 * study->step_s);
     snprintf(s->x_label, sizeof s->x_label, "milliseconds of computing for %.3g ms of the body's time, median",
@@ -220,8 +252,15 @@ static pal_err draw(const pal_study_file *file, char **svg, size_t *n_byte, pal_
                      .label = s->label};
     plot.guide[0] = (pal_plot_guide){.vertical = true, .at = 1e3 * study->step_s, .text = s->live};
     plot.guide[1] = (pal_plot_guide){.at = 1e3 * study->reference_m, .text = s->own};
-    plot.curve[plot.n_curve++] =
-        (pal_curve){.name = "the front", .n = s->n_front, .x = s->front_x, .y = s->front_y, .bare = true, .ink = true};
+    if (of == FORCE) {
+        snprintf(s->own, sizeof s->own, "the reference itself from a mesh 1.4 times coarser");
+        plot.guide[1].at = 100 * study->reference_force_N / study->max_force_N;
+        plot.n_guide = plot.guide[1].at > 0 ? 2 : 1;
+        plot.y_label = "RMS error of the force felt, % of the largest (60 models a second, 50 ms round trip)";
+    } else {
+        plot.curve[plot.n_curve++] = (pal_curve){
+            .name = "the front", .n = s->n_front, .x = s->front_x, .y = s->front_y, .bare = true, .ink = true};
+    }
     bool any_apart = false;
     for (int k = 0; k < s->n_method; k++) {
         any_apart = any_apart || s->apart[k];
@@ -233,7 +272,7 @@ static pal_err draw(const pal_study_file *file, char **svg, size_t *n_byte, pal_
                                                  .hollow = s->apart[k],
                                                  .dots = true};
     }
-    if (any_apart)
+    if (any_apart && of != FORCE)
         plot.y_label =
             "largest error, mm (hollow: fitted to this load or failed a robustness case, so not on the front)";
     pal_err err = pal_plot_text(&plot, svg, n_byte, diag);
@@ -343,7 +382,7 @@ static const char sorting[] =
     "done=document.execCommand('copy')}\n"
     "copied.firstChild.textContent=done?'copied:':'to be copied:'}));\n</script>\n";
 
-static void put_page(FILE *to, const pal_study_file *file, const char *svg)
+static void put_page(FILE *to, const pal_study_file *file, const char *svg, const char *force_svg)
 {
     const pal_study *s = &file->study;
     char text[200];
@@ -368,6 +407,13 @@ static void put_page(FILE *to, const pal_study_file *file, const char *svg)
         fprintf(to, "<div class=\"wide\">%s</div>\n", svg);
     else
         fputs("<p>Nothing was measured, so there is nothing to draw.</p>\n", to);
+    if (force_svg)
+        fprintf(to,
+                "<div class=\"wide\">%s</div>\n<p>Force: what a device renders from the models of each "
+                "configuration in a press (in 1 s, held 0.5 s, out), against the reference's own force at the same "
+                "pose, in per cent of its largest, %.3g N; that one changes by %.2g %% from a mesh 1.4 times "
+                "coarser.</p>\n",
+                force_svg, s->max_force_N, 100 * s->reference_force_N / s->max_force_N);
     fprintf(to,
             "<p>&#9733; the front: nothing else is both cheaper and nearer. ms: for %.3g ms of the body's time, with "
             "shorter steps so many of them; live: no more than that. Error: the largest distance from the reference, "
@@ -388,20 +434,26 @@ static void put_page(FILE *to, const pal_study_file *file, const char *svg)
 
 pal_err pal_study_publish(const pal_study_file *file, const char *stem, pal_diagnostic *diag)
 {
-    char path[PAL_STUDY_PATH + 8], *svg = NULL;
-    size_t n_byte = 0;
+    static const char *const ending[2] = {"", "_force"};
+    char path[PAL_STUDY_PATH + 16], *svg[2] = {NULL, NULL};
     snprintf(path, sizeof path, "%s.csv", stem);
     PAL_TRY(pal_study_file_csv(file, path, diag));
-    pal_err err = draw(file, &svg, &n_byte, diag);
-    if (err && err != PAL_ERR_REFUSED) return err;
-    snprintf(path, sizeof path, "%s.svg", stem);
-    err = svg ? pal_file_write(path, svg, n_byte, diag) : PAL_ERR_OK;
+    pal_err err = PAL_ERR_OK;
+    for (int k = 0; k < 2 && !err; k++) {
+        size_t n_byte = 0;
+        /* refused: no point to draw */
+        err = draw(file, k ? FORCE : DISPLACEMENT, &svg[k], &n_byte, diag);
+        if (err == PAL_ERR_REFUSED) err = PAL_ERR_OK;
+        snprintf(path, sizeof path, "%s%s.svg", stem, ending[k]);
+        if (!err && svg[k]) err = pal_file_write(path, svg[k], n_byte, diag);
+    }
     snprintf(path, sizeof path, "%s.html", stem);
     pal_file_out page;
     if (!err && !(err = pal_file_begin(&page, path, diag))) {
-        put_page(page.file, file, svg);
+        put_page(page.file, file, svg[0], svg[1]);
         err = pal_file_end(&page, diag);
     }
-    free(svg);
+    free(svg[0]);
+    free(svg[1]);
     return err;
 }

@@ -10,7 +10,8 @@
  * reason. */
 void pal_study_print(const pal_study_file *file, FILE *to);
 /* Writes STEM.csv, STEM.svg (error against milliseconds, logarithmic: one marker per method, the front as a line, real
- * time and the reference's own error as guides) and STEM.html. Without a measured point there is no plot, and the page
- * states it. Errors: IO, MEMORY. */
+ * time and the reference's own error as guides), STEM_force.svg (the same of the force felt at 50 ms of round trip,
+ * where it was judged) and STEM.html with both. Without a measured point there is no plot, and the page states it.
+ * Errors: IO, MEMORY. */
 pal_err pal_study_publish(const pal_study_file *file, const char *stem, pal_diagnostic *diag);
 #endif

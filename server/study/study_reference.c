@@ -1,5 +1,6 @@
 /* The reference of a study: the finest affordable body, its error estimated from its last changes, and the
  * trajectory of the tip. */
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/solve/convergence.h"
 #include "server/study/study_job.h"
@@ -39,27 +40,40 @@ static uint64_t sum_of(const pal_study_job *job, const char *what, const pal_con
 {
     const double number[] = {s->size,       s->step_s,    s->tolerance, s->k_distance_J, s->k_area_J,
                              s->k_volume_J, job->seconds, job->tip,     job->n_probe};
-    bool moves = !strcmp(what, "trajectory");
+    const pal_study_press *press = &job->press;
+    bool moves = !strcmp(what, "trajectory"), pressed = !strcmp(what, "force");
     uint64_t sum = add_word(PAL_HASH_START, what);
     sum = add_word(add_word(add_word(add_word(sum, s->model), s->element), s->law), s->solver);
     sum = pal_study_digest_numbers(sum, number, 6);
     if (moves) sum = pal_study_digest_numbers(sum, number + 6, 2);
+    if (pressed) sum = pal_study_digest_numbers(sum, (double[]){press->radius_m, press->depth_m}, 2);
+    if (pressed) sum = pal_study_digest_numbers(pal_study_digest_numbers(sum, press->at_m, 3), press->inward, 3);
     for (int k = 0; k < load->n_load; k++) sum = pal_study_digest_load(sum, &load->load[k]);
     return pal_study_digest_numbers(pal_study_digest_numbers(sum, number + 8, 1), job->probe, 3 * (size_t)job->n_probe);
 }
 
-/* A static solution under `load`, or the trajectory under the first load (load NULL): value [n][3] from the cache, else
- * computed and stored. */
-static pal_err cached(pal_study_job *job, const pal_configuration *configuration, const pal_problem_case *load,
-                      double (*value)[3], int n, int *n_node, pal_diagnostic *diag)
+typedef enum answer_kind { REST, TRAJECTORY, FORCE } answer_kind;
+
+static pal_err solve(pal_study_job *job, answer_kind kind, const pal_configuration *configuration,
+                     const pal_problem_case *load, double (*value)[3], int *n_node, pal_diagnostic *diag)
 {
+    if (kind == REST) return pal_study_static(job, configuration, load, value[0], n_node, diag);
+    if (kind == FORCE) return pal_study_press_force(job, configuration, value, diag);
+    return pal_study_trajectory(job, configuration, value, NULL, 0, NULL, NULL, diag);
+}
+
+/* A static solution under `load`, the trajectory under it, or the forces of the scripted press: value [n][3] from the
+ * cache, else computed and stored. */
+static pal_err cached(pal_study_job *job, answer_kind kind, const pal_configuration *configuration,
+                      const pal_problem_case *load, double (*value)[3], int n, int *n_node, pal_diagnostic *diag)
+{
+    static const char *const name[] = {"rest", "trajectory", "force"};
     const pal_study_options *o = job->options;
-    uint64_t key = sum_of(job, load ? "rest" : "trajectory", configuration, load ? load : job->load[0]);
+    uint64_t key = sum_of(job, name[kind], configuration, load);
     pal_study_answer answer = {.n_node = 0};
     pal_diagnostic reason = {{0}};
     if (!o->recall || !o->recall(key, &answer, value[0], 3 * n, o->user)) {
-        answer.err = load ? pal_study_static(job, configuration, load, value[0], &answer.n_node, &reason)
-                          : pal_study_trajectory(job, configuration, value, NULL, 0, NULL, NULL, &reason);
+        answer.err = solve(job, kind, configuration, load, value, &answer.n_node, &reason);
         snprintf(answer.reason, sizeof answer.reason, "%.*s", PAL_CONFIGURATION_TEXT - 1, reason.text);
         if (answer.err) memset(value, 0, sizeof *value * (size_t)n);
         /* an answer cut short by a stop or by lack of memory is not stored */
@@ -73,7 +87,7 @@ static pal_err cached(pal_study_job *job, const pal_configuration *configuration
 pal_err pal_study_cached_static(pal_study_job *job, const pal_configuration *configuration,
                                 const pal_problem_case *load, double *u, int *n_node, pal_diagnostic *diag)
 {
-    return cached(job, configuration, load, (double(*)[3])u, job->n_probe, n_node, diag);
+    return cached(job, REST, configuration, load, (double(*)[3])u, job->n_probe, n_node, diag);
 }
 
 /* longest over shortest side, a quarter of it, 1 to 3; the sides of a box-shaped body */
@@ -205,6 +219,47 @@ static pal_err at_rest(pal_study_job *job)
     return PAL_ERR_OK;
 }
 
+/* size of a reference one step coarser */
+static int coarser_reference(const pal_study_job *job)
+{
+    if (job->adaptive) return job->reference - 1;
+    int size = pal_study_fit_size(job, job->reference / PAL_REFERENCE_RATIO);
+    return size < job->reference ? size : job->reference - 1;
+}
+
+static pal_err press_reference(pal_study_job *job, int size, double (*force_N)[3])
+{
+    pal_configuration s = reference_configuration(job, size);
+    pal_diagnostic reason = {{0}};
+    int n_node;
+    s.step_s = fmin((job->options->quick ? 2 : 1) * PAL_FORCE_REFERENCE_STEP_S, job->scene->step_s);
+    pal_err err = cached(job, FORCE, &s, job->load[0], force_N, PAL_STUDY_TICKS, &n_node, &reason);
+    return err ? pal_diagnostic_set(job->diag, err, "%s", reason.text) : PAL_ERR_OK;
+}
+
+/* Force of the reference in the scripted press, and how much finer voxels still change it. One that it cannot follow
+ * leaves forces unjudged */
+static pal_err press(pal_study_job *job)
+{
+    double(*coarser_N)[3] = NULL, sum = 0;
+    job->out->max_force_N = job->out->reference_force_N = NAN;
+    if (!job->options->renderer || job->scene->n_tool < 1) return PAL_ERR_OK;
+    pal_study_place_press(job);
+    if (!job->press.is_placed) return PAL_ERR_OK;
+    PAL_TRY(report_progress(job, "reference, pressed", job->n_load + 1.5));
+    pal_err err = press_reference(job, job->reference, job->force_N);
+    PAL_ARRAY(&err, coarser_N, PAL_STUDY_TICKS);
+    if (!err) job->out->max_force_N = pal_max_norm3(job->force_N[0], PAL_STUDY_TICKS);
+    if (!err) err = press_reference(job, coarser_reference(job), coarser_N);
+    for (int k = 0; k < PAL_STUDY_TICKS && !err; k++) {
+        double off = pal_dist3(coarser_N[k], job->force_N[k]);
+        sum += off * off;
+    }
+    if (!err) job->out->reference_force_N = sqrt(sum / PAL_STUDY_TICKS);
+    free(coarser_N);
+    return err == PAL_ERR_STATE || err == PAL_ERR_MEMORY ? err : PAL_ERR_OK;
+}
+
 pal_err pal_study_reference(pal_study_job *job)
 {
     PAL_TRY(at_rest(job));
@@ -220,5 +275,6 @@ pal_err pal_study_reference(pal_study_job *job)
     PAL_TRY(report_progress(job, "reference in motion", job->n_load + 1));
     pal_configuration s = reference_configuration(job, job->reference);
     int n_node;
-    return cached(job, &s, NULL, job->trajectory, job->n_trajectory, &n_node, job->diag);
+    PAL_TRY(cached(job, TRAJECTORY, &s, job->load[0], job->trajectory, job->n_trajectory, &n_node, job->diag));
+    return press(job);
 }

@@ -199,6 +199,7 @@ pal_err pal_study_measure(pal_study_job *job, const pal_study_entry *entry, pal_
     *out = (pal_study_point){.measured = {.configuration = entry->configuration, .ms = NAN, .error_m = NAN}};
     out->ms_p95 = out->static_rms_m = out->static_max_m = out->trajectory_rms_m = out->trajectory_max_m = NAN;
     out->predicted_ms = out->predicted_m = NAN;
+    pal_study_forget_forces(out);
     pal_diagnostic reason = {{0}};
     if (entry->calibrate && (out->err = pal_study_fit(job, &out->measured.configuration, &reason))) {
         snprintf(out->reason, sizeof out->reason, "calibration: %.*s", PAL_CONFIGURATION_TEXT - 16, reason.text);
@@ -223,6 +224,8 @@ pal_err pal_study_measure(pal_study_job *job, const pal_study_entry *entry, pal_
         }
     }
     if (!pal_study_continues(job)) return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped in a configuration");
+    if (!out->err && pal_study_measure_force(job, out) == PAL_ERR_STATE)
+        return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped in a configuration");
     if (!out->err) out->measured.error_m = fmax(out->static_max_m, out->trajectory_max_m);
     return PAL_ERR_OK;
 }

@@ -16,8 +16,18 @@
 static const char format[] = "palpate-study-1";
 
 /* A member of a struct as JSON. COUNT: int; CODE: pal_err by name; the others: double. null is NaN where allowed.
- * Studies stored before an optional key existed read as 0. */
-typedef enum field_kind { TEXT, TEXT_OR_EMPTY, COUNT, FLAG, CODE, NUMBER, NUMBER_OR_NULL, NUMBER_OPTIONAL } field_kind;
+ * Studies stored before an optional key existed read as 0, or NaN where null is allowed. */
+typedef enum field_kind {
+    TEXT,
+    TEXT_OR_EMPTY,
+    COUNT,
+    FLAG,
+    CODE,
+    NUMBER,
+    NUMBER_OR_NULL,
+    NUMBER_OPTIONAL,
+    NUMBER_OPTIONAL_OR_NULL
+} field_kind;
 typedef struct field {
     const char *key;
     field_kind kind;
@@ -51,6 +61,14 @@ static const field point_field[] = {
     {"static_max_m", NUMBER_OR_NULL, POINT(static_max_m), 0, 1e300},
     {"trajectory_rms_m", NUMBER_OR_NULL, POINT(trajectory_rms_m), 0, 1e300},
     {"trajectory_max_m", NUMBER_OR_NULL, POINT(trajectory_max_m), 0, 1e300},
+    {"force_rms_0_N", NUMBER_OPTIONAL_OR_NULL, POINT(force_rms_N[0]), 0, 1e300},
+    {"force_rms_50_N", NUMBER_OPTIONAL_OR_NULL, POINT(force_rms_N[1]), 0, 1e300},
+    {"force_rms_200_N", NUMBER_OPTIONAL_OR_NULL, POINT(force_rms_N[2]), 0, 1e300},
+    {"force_rms_50_30Hz_N", NUMBER_OPTIONAL_OR_NULL, POINT(force_rms_N[3]), 0, 1e300},
+    {"force_max_0_N", NUMBER_OPTIONAL_OR_NULL, POINT(force_max_N[0]), 0, 1e300},
+    {"force_max_50_N", NUMBER_OPTIONAL_OR_NULL, POINT(force_max_N[1]), 0, 1e300},
+    {"force_max_200_N", NUMBER_OPTIONAL_OR_NULL, POINT(force_max_N[2]), 0, 1e300},
+    {"force_max_50_30Hz_N", NUMBER_OPTIONAL_OR_NULL, POINT(force_max_N[3]), 0, 1e300},
     {"prepare_s", NUMBER_OR_NULL, POINT(prepare_s), 0, 1e12},
     {"elements", NUMBER_OPTIONAL, POINT(n_element), 0, 1e12},
     {"read_ms", NUMBER_OPTIONAL, POINT(read_ms), 0, 1e12},
@@ -71,6 +89,8 @@ static const field file_field[] = {
     {"reference", TEXT_OR_EMPTY, FILE_AT(study.reference), 0, 0},
     {"reference_m", NUMBER_OR_NULL, FILE_AT(study.reference_m), 0, 1e300},
     {"max_m", NUMBER_OR_NULL, FILE_AT(study.max_m), 0, 1e300},
+    {"max_force_N", NUMBER_OPTIONAL_OR_NULL, FILE_AT(study.max_force_N), 0, 1e300},
+    {"reference_force_N", NUMBER_OPTIONAL_OR_NULL, FILE_AT(study.reference_force_N), 0, 1e300},
     {"length_scale_m", NUMBER_OR_NULL, FILE_AT(study.length_scale_m), 0, 1e300},
     {"step_s", NUMBER, FILE_AT(study.step_s), 0, 0.1},
     {"command", TEXT_OR_EMPTY, FILE_AT(command), 0, 0},
@@ -295,7 +315,9 @@ static pal_err get_code(const pal_json *object, const char *key, pal_err *out)
 
 static pal_err get_field(const pal_json *object, const field *f, void *at)
 {
-    if (f->kind != NUMBER_OPTIONAL) PAL_TRY(need(object, f->key));
+    const bool optional = f->kind == NUMBER_OPTIONAL || f->kind == NUMBER_OPTIONAL_OR_NULL;
+    const bool null = f->kind == NUMBER_OR_NULL || f->kind == NUMBER_OPTIONAL_OR_NULL;
+    if (!optional) PAL_TRY(need(object, f->key));
     switch (f->kind) {
     case CODE:
         return get_code(object, f->key, at);
@@ -307,7 +329,7 @@ static pal_err get_field(const pal_json *object, const field *f, void *at)
     case TEXT_OR_EMPTY:
         return pal_json_text(object, f->key, f->kind == TEXT_OR_EMPTY, at, f->n_byte);
     default:
-        if (f->kind != NUMBER_OR_NULL || !cJSON_IsNull(pal_json_at(object, f->key).value))
+        if (!null || (pal_json_has(object, f->key) && !cJSON_IsNull(pal_json_at(object, f->key).value)))
             return pal_json_number(object, f->key, f->low, f->high, at);
         *(double *)at = NAN;
         return PAL_ERR_OK;
@@ -407,6 +429,8 @@ int pal_study_configurations(const pal_study *study, pal_measured_configuration 
         const pal_study_point *p = &study->point[order[k]];
         if (!pal_study_measured(p)) continue;
         out[n] = p->measured;
+        const double force = 100 * p->force_rms_N[1] / study->max_force_N;
+        out[n].force_percent = isfinite(force) ? force : 0;
         if (out[n].configuration.step_s == 0) out[n].configuration.step_s = study->step_s;
         n++;
     }

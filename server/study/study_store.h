@@ -2,8 +2,8 @@
  * configuration from it without measuring.
  *
  *   {"format": "palpate-study-1",
- *    "name": "liver", "machine": "...", "reference": "...", "reference_m": 1e-5, "max_m": .., "length_scale_m": ..,
- *    "step_s": ..,
+ *    "name": "liver", "machine": "...", "reference": "...", "reference_m": 1e-5, "max_m": .., "max_force_N": ..,
+ *    "reference_force_N": .., "length_scale_m": .., "step_s": ..,
  *    "subject": {"body": "liver", "index": 0, "shape": "16 hex digits",
  *    "loads": "three presses and a pull, 0.5 s", "digest": "16 hex digits", "methods": "fem"},
  *    "command": "palpate study liver/scene.json",
@@ -11,12 +11,15 @@
  *    "points": [{"model": "fem", "element": .., "law": .., "solver": .., "size": 16, "step_s": .., "tolerance": ..,
  *    "k_distance_J": .., "k_area_J": .., "k_volume_J": .., "ms": .., "error_m": .., "front": true, "err": "OK",
  *    "reason": "", "nodes": .., "substeps": .., "ms_p95": .., "static_rms_m": .., "static_max_m": ..,
- *    "trajectory_rms_m": .., "trajectory_max_m": .., "prepare_s": .., "elements": .., "read_ms": ..,
+ *    "trajectory_rms_m": .., "trajectory_max_m": .., "force_rms_0_N": .., "force_rms_50_N": .., "force_rms_200_N": ..,
+ *    "force_rms_50_30Hz_N": .., "force_max_0_N": .., "force_max_50_N": .., "force_max_200_N": ..,
+ *    "force_max_50_30Hz_N": .., "prepare_s": .., "elements": .., "read_ms": ..,
  *    "predicted_ms": .., "predicted_m": ..}]}
  *
- * "complete" means that every configuration of these methods is present. Every key except elements and read_ms is
- * required. Numbers have enough digits to restore the same bits. null stands for a value that is not a number. The
- * study of a scene file NAME.json is NAME_study.json, that of scene.json is study.json. A table (.csv), a plot
+ * "complete" means that every configuration of these methods is present. force_rms_50_30Hz_N: at 30 models a
+ * second and 50 ms of round trip; the others at 60. Every key except elements, read_ms and those of forces is required.
+ * Numbers have enough digits to restore the same bits. null stands for a value that is not a number. The study of a
+ * scene file NAME.json is NAME_study.json, that of scene.json is study.json. A table (.csv), a plot
  * (.svg) and a page (.html) of the same name may stand beside it. Thread: [load]. */
 #ifndef PAL_STUDY_STUDY_STORE_H
 #define PAL_STUDY_STUDY_STORE_H

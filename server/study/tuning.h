@@ -55,6 +55,17 @@
 /* share of the first load that acts suddenly: the overshoot reaches the displacement of the whole load (S) */
 #define PAL_SUDDEN_LOAD 0.5
 
+/* scripted press whose force is judged: s of its ramp, hold and way out; depth above the surface at its begin and end
+ * over its depth; radius of a tool of default size; s: step of its reference, a tenth of the time in which contact
+ * changes, twice that when quick (F, tests/study/test_force_error.c) */
+#define PAL_FORCE_RAMP_S           1.0
+#define PAL_FORCE_HOLD_S           0.5
+#define PAL_FORCE_OUT_S            0.5
+#define PAL_FORCE_S                (PAL_FORCE_RAMP_S + PAL_FORCE_HOLD_S + PAL_FORCE_OUT_S)
+#define PAL_PRESS_GAP              0.2
+#define PAL_TOOL_RADIUS            0.04
+#define PAL_FORCE_REFERENCE_STEP_S (1.0 / 240)
+
 /* relative residual at rest; relative change between peaks of kinetic energy that counts as rest (S) */
 #define PAL_REST_TOLERANCE 1e-6
 #define PAL_REST_CHANGE    1e-4

@@ -105,6 +105,55 @@ static void a_looser_solver_leaves_more(void)
     CHECK(left[1] > 0 && left[1] < 0.1 * left[0]);
 }
 
+/* a ball pressed by a tool from above, held for 1 s, on so many voxels; the force on the tool */
+static pal_world *pressed(const pal_scene *at, double *force_N)
+{
+    pal_world *w = NULL;
+    if (pal_world_create(at, NULL, &w)) abort();
+    for (int k = 1; k <= 120; k++) {
+        const pal_pose pose = {.position_m = {0.004, 0, 0.072 - 0.012 * fmin(k / 60.0, 1)}, .quat = {1, 0, 0, 0}};
+        CHECK(!pal_world_pose(w, 0, &pose) && !pal_world_step(w, at->step_s));
+    }
+    const double *f = pal_world_tools(w)->tool[0].force_N;
+    *force_N = sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
+    return w;
+}
+
+/* The force at the same depth on this mesh against that on a finer one; bounds as those of displacements */
+static void the_error_of_force_is_what_finer_meshes_change(void)
+{
+    pal_scene *fem = fem_scene();
+    memcpy(fem->body[0].effect, scene.body[0].effect, sizeof scene.body[0].effect);
+    fem->body[0].n_effect = scene.body[0].n_effect;
+    fem->body[0].material.damping_1_s = 8;
+    fem->tool[0].radius_m = 0.02;
+    static const int size[] = {12, 20};
+    double force_N[2], percent = NAN;
+    for (int k = 0; k < 2; k++) {
+        const pal_configuration to = {.model = "fem", .element = "hex8_bbar", .law = "corotational", .size = size[k]};
+        pal_configured_scene *set = NULL;
+        pal_estimate e;
+        REQUIRE(!pal_configuration_make(fem, 0, &to, NULL, &set));
+        pal_world *w = pressed(&set->scene, &force_N[k]);
+        if (k == 0) {
+            REQUIRE(estimate_of(&set->scene, w, &e));
+            percent = e.force_percent;
+        }
+        pal_world_destroy(w);
+        pal_configured_scene_free(set);
+    }
+    const double off = 100 * fabs(force_N[0] / force_N[1] - 1);
+    printf("  %d voxels: %.4f N, %.3g %% off, estimated %.3g %%\n", size[0], force_N[0], off, percent);
+    CHECK(percent > 0.6 * off && percent < 1.7 * off);
+    /* nothing presses */
+    pal_world *w = swinging(fem, 2);
+    pal_estimate e;
+    REQUIRE(estimate_of(fem, w, &e));
+    CHECK(isnan(e.force_percent) && isfinite(e.discretisation_m));
+    pal_world_destroy(w);
+    free(fem);
+}
+
 static void every_part_is_known_of_finite_elements_and_of_springs(void)
 {
     /* springs have 1.5 s of processor time to come to rest in, which is too little under sanitizers */
@@ -570,6 +619,7 @@ int main(void)
     if (!estimate_scene(8)) return 1;
     RUN_LONG(the_part_of_time_is_what_shorter_steps_change);
     RUN_LONG(a_looser_solver_leaves_more);
+    RUN(the_error_of_force_is_what_finer_meshes_change);
     RUN(every_part_is_known_of_finite_elements_and_of_springs);
     RUN(neighbours_follow_the_models_of_cost_and_error);
     RUN(a_steps_time_is_told_apart);

@@ -8,6 +8,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
 {
     pal_replay_report report;
     pal_diagnostic diag;
-    (void)pal_replay_parse("fuzz", bytes, n_byte, NULL, &report, &diag);
+    (void)pal_replay_parse("fuzz", bytes, n_byte, NULL, NULL, &report, &diag);
     return 0;
 }

@@ -132,6 +132,42 @@ check "exit code $code" code_is 0
 check "not the reference" has out '"truth":"timoshenko","kinematics":"linear"'
 end
 
+# ---- a hand's loads ----
+client=$(dirname "$palpate")/palpate-client
+if [ -x "$client" ]; then
+    "$palpate" prepare --procedural --resolution 10 -o organ >out 2>err
+    "$palpate" serve organ/scene.json --record pull.log --port 0 --seconds 20 >served 2>&1 &
+    server=$!
+    begin "the touches of a recording become load cases, a release the damping"
+    check "the server does not say where it is" shows served "$server" 'open http'
+    "$client" "ws://$(sed -n 's,.*open http://\([0-9.:]*\)/.*,\1,p' served)/ws" --script pull --seconds 5 \
+        >out 2>err
+    kill -INT "$server"
+    wait "$server"
+    run calibrate organ/scene.json --from pull.log --split 1 --budget 5 --json -o hand.json
+    check "exit code $code" code_is 0
+    for key in from load_share release; do check "no key $key" has out "\"$key\":"; done
+    check "no pull among the cases" has out '"id":"pull-1"'
+    check "a case without its moment and force" has out '"time_s":[0-9.]*,"force_N":[0-9.]*'
+    check "the error is not below the start's" at_most "$(number error_percent)" "$(number start_percent)"
+    check "the scene has no constants" has hand.json k_distance_J
+    check "the scene does not say what it was fitted to" has hand.json 'calibrated on pull-1'
+    run plan hand.json
+    check "plan refuses the scene" code_is 0
+    end
+    refuse 1 "no load case or reference" organ/scene.json --from pull.log --case press-9 -o no.json
+    refuse 1 "is not fem or recording" organ/scene.json --from pull.log --truth reference -o no.json
+    refuse 1 "recorded from another scene" hand.json --from pull.log -o no.json
+    begin "does not write over the recording"
+    cp pull.log kept.log
+    run calibrate organ/scene.json --from pull.log -o pull.log
+    refused 1 "is the recording itself"
+    check "the recording changed" same pull.log kept.log
+    end
+else
+    skip "loads of a recorded hand" "palpate-client is not built"
+fi
+
 # ---- refusals ----
 refuse 2 "--case ID is missing" "$bar" -o no.json
 refuse 2 "-o SCENE.json is missing" "$bar" --case bend

@@ -280,7 +280,7 @@ static void the_largest_study_fits_its_limit(void)
     full.type = PAL_CONTROL_STUDY;
     full.study.n_point = PAL_WIRE_POINT_MAX, full.study.reference_m = 1e-7 / 3;
     for (uint32_t i = 0; i < PAL_WIRE_POINT_MAX; i++) {
-        full.study.point[i] = (pal_wire_study_point){UINT32_MAX, "", "", 100 / 3.0, 1e-7 / 3, true};
+        full.study.point[i] = (pal_wire_study_point){UINT32_MAX, "", "", 100 / 3.0, 1e-7 / 3, true, 100 / 3.0};
         memset(full.study.point[i].label, '"', PAL_WIRE_LABEL_BYTES - 1);
         memset(full.study.point[i].method, '"', PAL_WIRE_METHOD_BYTES - 1);
     }

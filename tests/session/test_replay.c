@@ -73,7 +73,7 @@ static void a_recorded_session_gives_the_same_hashes_again(void)
     REQUIRE(record());
     n_whole = slurp(path, whole, sizeof whole);
     REQUIRE(n_whole > 1000 && n_whole < sizeof whole);
-    pal_err err = pal_replay_run(path, &scene, &report, &diag);
+    pal_err err = pal_replay_run(path, &scene, NULL, &report, &diag);
     if (err) CHECK_FAIL("%s", diag.text);
     CHECK_INT(report.n_tick, STEPS);
     CHECK_INT(report.n_pose, 5 * 38);
@@ -114,7 +114,7 @@ static void changed_poses_and_materials_are_found_at_the_next_hash(void)
         memcpy(bytes, whole, n_whole);
         uint64_t when = change(bytes, what[k].kind, what[k].byte);
         REQUIRE(when > 0);
-        REQUIRE(!pal_replay_parse("log", bytes, n_whole, &scene, &report, &diag));
+        REQUIRE(!pal_replay_parse("log", bytes, n_whole, &scene, NULL, &report, &diag));
         CHECK(report.n_hash_equal < report.n_hash);
         CHECK(report.first_difference > when);
         if (k == 1) CHECK_LE((double)report.first_difference, (double)when + PAL_INPUT_HASH_STEPS);
@@ -126,10 +126,10 @@ static void every_cut_is_refused_with_its_byte(void)
     pal_replay_report report;
     pal_diagnostic diag;
     REQUIRE(n_whole > 0);
-    CHECK_INT(pal_replay_parse("log", whole, n_whole, NULL, &report, &diag), 0);
+    CHECK_INT(pal_replay_parse("log", whole, n_whole, NULL, NULL, &report, &diag), 0);
     for (size_t n = 0; n < n_whole; n += n < 300 ? 1 : 977) {
         diag.text[0] = 0;
-        CHECK_INT(pal_replay_parse("log", whole, n, NULL, &report, &diag), PAL_ERR_REFUSED);
+        CHECK_INT(pal_replay_parse("log", whole, n, NULL, NULL, &report, &diag), PAL_ERR_REFUSED);
         CHECK(!strncmp(diag.text, "log: byte ", 10));
     }
 }
@@ -138,7 +138,7 @@ static void refused(const uint8_t *bytes, size_t n, const char *part)
 {
     pal_replay_report report;
     pal_diagnostic diag = {""};
-    CHECK_INT(pal_replay_parse("log", bytes, n, &scene, &report, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(pal_replay_parse("log", bytes, n, &scene, NULL, &report, &diag), PAL_ERR_REFUSED);
     if (!strstr(diag.text, part)) CHECK_FAIL("\"%s\" does not say \"%s\"", diag.text, part);
 }
 
@@ -178,11 +178,11 @@ static void a_log_of_another_material_is_refused_and_texts_do_not_matter(void)
     pal_scene other = scene;
     REQUIRE(n_whole > 0);
     snprintf(other.title, sizeof other.title, "another title");
-    CHECK_INT(pal_replay_parse("log", whole, n_whole, &other, &report, &diag), 0);
+    CHECK_INT(pal_replay_parse("log", whole, n_whole, &other, NULL, &report, &diag), 0);
     other.body[0].material.young_Pa = nextafter(5000, 6000);
-    CHECK_INT(pal_replay_parse("log", whole, n_whole, &other, &report, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(pal_replay_parse("log", whole, n_whole, &other, NULL, &report, &diag), PAL_ERR_REFUSED);
     CHECK(strstr(diag.text, "another scene") != NULL);
-    CHECK_INT(pal_replay_run("/no/such/log", &scene, &report, &diag), PAL_ERR_IO);
+    CHECK_INT(pal_replay_run("/no/such/log", &scene, NULL, &report, &diag), PAL_ERR_IO);
 }
 
 /* far more than a ring of 1 KiB holds before the writer comes round */
@@ -201,7 +201,7 @@ static void what_does_not_fit_is_counted_and_makes_the_log_invalid(void)
     uint64_t n = pal_input_log_dropped(log);
     CHECK(n > 0);
     CHECK_INT(pal_input_log_close(log, 0, 7), 0);
-    CHECK_INT(pal_replay_run(name, &scene, &report, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(pal_replay_run(name, &scene, NULL, &report, &diag), PAL_ERR_REFUSED);
     CHECK(strstr(diag.text, "records were lost") != NULL);
     unlink(name);
 }

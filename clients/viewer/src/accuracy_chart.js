@@ -1,6 +1,6 @@
 // Draws the plot of error against cost as SVG: axes, the study's points and its Pareto front, the running configuration.
 import { layOutPlot } from "./accuracy_plot.js";
-import { milliseconds, millimetres, plainLabel } from "./accuracy_text.js";
+import { milliseconds, millimetres, plainLabel, pointText } from "./accuracy_text.js";
 
 const BOX = { left: 40, right: 302, top: 20, bottom: 172 };
 const SVG = "http://www.w3.org/2000/svg";
@@ -63,7 +63,7 @@ function drawPoints(plot, { requested }) {
         out.push(shape("polyline", { points, class: "front" }));
     }
     for (const { x, y, point, colour } of plot.marks) {
-        const text = `${plainLabel(point.label)}: ${milliseconds(point.cost_ms)}, ${millimetres(point.error_m)}`;
+        const text = pointText(point);
         const style = point.pareto_optimal ? { r: 4, class: "point on-front" } : { r: 2.8, class: "point" };
         out.push(shape("circle", { cx: x, cy: y, fill: colour, ...style }, text));
     }

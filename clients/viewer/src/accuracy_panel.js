@@ -10,6 +10,7 @@ import {
     neighbourText,
     partsOf,
     plainLabel,
+    pointText,
     switchText,
 } from "./accuracy_text.js";
 import { htmlById, inputById, makeOption, selectById } from "./dom.js";
@@ -222,9 +223,7 @@ export class AccuracyPanel {
         }
         this.slider.disabled = this.pending !== null;
         const point = this.front[Number(this.slider.value)];
-        const text = point
-            ? `${plainLabel(point.label)}: ${milliseconds(point.cost_ms)}, ${millimetres(point.error_m)}`
-            : "";
+        const text = point ? pointText(point) : "";
         this.at("choice").textContent = text;
         if (point) this.slider.setAttribute("aria-valuetext", text);
     }

@@ -3,6 +3,7 @@
 /**
  * @typedef {import("./control_table.js").Estimate} Estimate
  * @typedef {import("./control_table.js").Neighbour} Neighbour
+ * @typedef {import("./control_table.js").StudyPoint} StudyPoint
  */
 
 /** smallest length that is displayed, m: shorter ones are "< 0.001 mm" */
@@ -45,6 +46,13 @@ export function millimetres(m) {
 /** a label of the server without underscores @param {string} label */
 export const plainLabel = (label) => label.replaceAll("_", " ");
 
+const percent = (/** @type {number} */ value) => `${value.toPrecision(2)} %`;
+
+/** a point of the study: cost, error, and the error of the force where it was judged @param {StudyPoint} point */
+export const pointText = (point) =>
+    `${plainLabel(point.label)}: ${milliseconds(point.cost_ms)}, ${millimetres(point.error_m)}` +
+    (point.force_percent === undefined ? "" : `, force ${percent(point.force_percent)} off at 50 ms`);
+
 /** @param {number | undefined} ms */
 export const milliseconds = (ms) => (ms === undefined ? "unknown" : `${short(ms)} ms`);
 
@@ -54,7 +62,7 @@ export const milliseconds = (ms) => (ms === undefined ? "unknown" : `${short(ms)
  */
 export function errorText(estimate) {
     if (!estimate) return { error: "being estimated", age: "", note: "", known: false };
-    const { age_s = 0, error_m, locking, diagnostic = "", tick, energy_error_percent } = estimate;
+    const { age_s = 0, error_m, locking, diagnostic = "", tick, energy_error_percent, force_percent } = estimate;
     if (tick === 0)
         return { error: diagnostic ? "not estimated" : "being estimated", age: "", note: diagnostic, known: false };
     const notes = [
@@ -63,6 +71,7 @@ export function errorText(estimate) {
         energy_error_percent !== undefined && error_m !== undefined && error_m >= RESOLUTION_M
             ? `Relative error in the energy norm: ${energy_error_percent.toPrecision(2)} %.`
             : "",
+        force_percent === undefined ? "" : `Force of tools: ${percent(force_percent)} off.`,
     ];
     const age = age_s > OLD_S ? `${short(Math.round(age_s))} s ago` : "";
     return { error: millimetres(error_m), age, note: notes.filter(Boolean).join(" "), known: true };

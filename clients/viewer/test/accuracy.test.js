@@ -10,7 +10,7 @@ import {
     neighbourArgs,
     positionOn,
 } from "../src/accuracy_plot.js";
-import { errorText, millimetres, neighbourText, partsOf, short, switchText } from "../src/accuracy_text.js";
+import { errorText, millimetres, neighbourText, partsOf, pointText, short, switchText } from "../src/accuracy_text.js";
 
 /** @param {number} index @param {number} ms @param {number} error_m @param {boolean} front @param {string} method */
 const point = (index, ms, error_m, front, method = "fem") => ({
@@ -205,6 +205,7 @@ test("an error that is pending, unavailable or old is described so", () => {
         known: true,
     });
     assert.equal(errorText(estimate({ age_s: undefined })).age, "", "without an age");
+    assert.equal(errorText(estimate({ force_percent: 12.34 })).note, "Force of tools: 12 % off.");
 });
 
 test("a neighbour is reached by its own arguments, another method only as a point of the study", () => {
@@ -273,4 +274,13 @@ test("numbers are short", () => {
     assert.equal(millimetres(undefined), "unknown");
     assert.equal(millimetres(4.5e-4), "0.45 mm");
     assert.equal(millimetres(1e-9), "< 0.001 mm");
+});
+
+test("a point of the study says how far its force is off where that was measured", () => {
+    const point = { index: 0, method: "fem", label: "fem 8_voxels", cost_ms: 1.5, error_m: 4e-4 };
+    assert.equal(pointText(point), "fem 8 voxels: 1.5 ms, 0.4 mm");
+    assert.equal(
+        pointText({ ...point, force_percent: 6.54 }),
+        "fem 8 voxels: 1.5 ms, 0.4 mm, force 6.5 % off at 50 ms",
+    );
 });

@@ -30,8 +30,9 @@ typedef struct pal_measured_configuration {
     pal_configuration configuration;
     double ms; /* median time of a step of the studied scene under load on that machine; of a configuration with a step
                 * of its own, of as many as make one step of the scene: ms below the scene's step is real time */
-    double error_m; /* largest distance from the reference in the study                */
-    bool front;     /* on the Pareto front: none is both cheaper and nearer            */
+    double error_m;       /* largest distance from the reference in the study                */
+    double force_percent; /* RMS error of the force felt in the study's press at 60 Hz and 50 ms; 0: not judged */
+    bool front;           /* on the Pareto front: none is both cheaper and nearer            */
 } pal_measured_configuration;
 
 /* the present configuration of a body; size is that of the prepared mesh (0 when it was made elsewhere) */

@@ -18,7 +18,7 @@ typedef struct pal_problem_material {
     double young_Pa, poisson, density_kg_m3;
 } pal_problem_material;
 
-typedef enum pal_load_kind { PAL_LOAD_TRACTION, PAL_LOAD_POINT, PAL_LOAD_GRAVITY } pal_load_kind;
+typedef enum pal_load_kind { PAL_LOAD_TRACTION, PAL_LOAD_POINT, PAL_LOAD_GRAVITY, PAL_LOAD_POINTS } pal_load_kind;
 typedef struct pal_problem_load {
     pal_load_kind kind;
     pal_box region;  /* TRACTION: the part of the surface in the box ...                       */
@@ -26,8 +26,10 @@ typedef struct pal_problem_load {
     double normal[3];
     double traction_Pa[3], total_N[3]; /* one of them given: has_traction, has_total (traction wins) */
     bool has_traction, has_total;
-    double point_m[3], force_N[3]; /* POINT: to the element around it by its shape functions    */
-    double gravity_m_s2[3];        /* GRAVITY                                                  */
+    double point_m[3], force_N[3];     /* POINT: to the element around it by its shape functions    */
+    double gravity_m_s2[3];            /* GRAVITY                                                  */
+    int n_points;                      /* POINTS: as POINT, many; a file has none, a recording does */
+    const double *points_m, *points_N; /* borrowed [n_points][3]                                   */
 } pal_problem_load;
 
 typedef struct pal_problem_support { /* every point inside is fixed, or displaced by move_m */
