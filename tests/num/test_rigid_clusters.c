@@ -64,7 +64,7 @@ static void what_is_rigid_comes_back(void)
         for (int i = 0; i < N; i++) {
             double spin[3] = {0};
             spin[k % 3] = 1;
-            if (k >= 6 && p.part[i] != 1) continue;
+            if (k >= 6 && p.cluster[i] != 1) continue;
             if (k % 6 < 3)
                 u[3 * i + k % 3] = 1;
             else
