@@ -32,6 +32,7 @@ typedef struct pal_calibrate_run {
     double (*trail)[2]; /* error and best so far of every evaluation, per cent; DBL_MAX: no equilibrium [n_trail] */
     int n_trail;
     double load_share; /* of a recording's forces that is fitted to */
+    bool replay_equal; /* the recording's state hashes came out again  */
     bool settled;      /* live is valid */
     pal_settle_report live;
     pal_release_report release; /* n_run 0: the damping was not looked for in a release */

@@ -269,6 +269,7 @@ static pal_err open_recording(pal_calibrate_run *run, pal_recorded_input *record
     if (!run->from) return PAL_ERR_OK;
     PAL_TRY(pal_recorded_input_open(run->input.problem, run->from, &run->common, recorded, diag));
     run->input.recorded = &recorded->loads;
+    run->replay_equal = recorded->replay.n_hash == recorded->replay.n_hash_equal;
     run->input.scene = recorded->scene.studied.scene;
     pal_configuration_of(run->input.scene, recorded->loads.body, &served);
     if (run->options.voxel.resolution == 0) run->options.voxel.resolution = served.size;
@@ -391,6 +392,8 @@ static void print_touches(const pal_calibrate_run *run)
             printf(", while the body moves by %.2g of its displacement a second", t->speed_1_s);
         printf("\n");
     }
+    if (run->from && !run->replay_equal)
+        printf("the replay differs from the recording, made by another build or machine: the loads are the replay's\n");
     if (run->from && run->load_share < 1)
         printf("these are %g of the forces of the hand, under which there is no equilibrium\n", run->load_share);
 }
@@ -575,6 +578,7 @@ static cJSON *as_json(const pal_calibrate_run *run)
                         {"steady_s", pal_json_or_null(run->settled && run->live.steady ? run->live.seconds : NAN)},
                         {"live", run->settled ? live_json(run) : cJSON_CreateNull()}, {"files", files},
                         {"seconds", seconds}, {"from", run->from ? JSON_TEXT(run->from) : cJSON_CreateNull()},
+                        {"replay_equal", run->from ? JSON_BOOL(run->replay_equal) : cJSON_CreateNull()},
                         {"load_share", run->from ? JSON_NUMBER(run->load_share) : cJSON_CreateNull()},
                         {"release", release_json(run)});
 }

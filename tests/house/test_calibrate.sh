@@ -146,6 +146,7 @@ if [ -x "$client" ]; then
     wait "$server"
     run calibrate organ/scene.json --from pull.log --split 1 --budget 5 --json -o hand.json
     check "exit code $code" code_is 0
+    check "the replay differs" has out '"replay_equal":true'
     for key in from load_share release; do check "no key $key" has out "\"$key\":"; done
     check "no pull among the cases" has out '"id":"pull-1"'
     check "a case without its moment and force" has out '"time_s":[0-9.]*,"force_N":[0-9.]*'
