@@ -53,7 +53,7 @@ struct pal_servo {
     double gap_s[SERVO_GAPS];
     int n_gap;
     bool first, has_position, estop_latched, lost, stale, was_stale, clutched, at_wall;
-    int degraded, bad_reads;
+    int degraded, bad_reads, read_error;
     double x[3], v[3], centre[3], frozen_x[3]; /* world pose, clutch centre in the device's frame */
     double fade, fade_rate, clutch_fade, scale_down, mean_square;
     double force_prev[3], patch_prev[3];
@@ -184,7 +184,8 @@ static bool servo_read(pal_servo *s, double dt)
 {
     const double *r = s->o.rotation;
     pal_dev_state state;
-    if (s->o.backend->read(s->o.device, &state) < 0 || !pal_finite3(state.position_m)) return false;
+    s->read_error = s->o.backend->read(s->o.device, &state);
+    if (s->read_error < 0 || !pal_finite3(state.position_m)) return false;
     if (!s->clutched) pal_copy3(s->frozen_x, s->x);
     const bool clutch = (state.buttons & PAL_DEVICE_BUTTON_CLUTCH) != 0;
     double away[3], x[3], step[3];
@@ -349,7 +350,9 @@ static void servo_walls(pal_servo *s, double force_d[3])
 static bool servo_limit(pal_servo *s, double force_d[3], double dt)
 {
     bool cut = false;
-    s->mean_square += (1 - exp(-dt)) * (pal_dot3(s->force_prev, s->force_prev) - s->mean_square);
+    /* a device that spares its motors heats by what it gives */
+    const double *given = s->device.has_force ? s->device.force_N : s->force_prev;
+    s->mean_square += (1 - exp(-dt)) * (pal_dot3(given, given) - s->mean_square);
     const bool hot = s->mean_square > s->o.info.continuous_N * s->o.info.continuous_N;
     servo_toward(&s->scale_down, hot ? 0 : 1, hot ? dt / 2 : dt / 5);
     pal_scale3(force_d, s->scale_down, force_d);
@@ -438,8 +441,15 @@ void pal_servo_tick(pal_servo *s, uint64_t now_ns)
     const double none[3] = {0, 0, 0};
     s->view.flags = 0;
     s->view.depth_m = s->view.rendered_stiffness_N_m = 0;
-    const bool good = !s->lost && servo_read(s, dt);
+    const bool good = servo_read(s, dt);
     servo_take_model(s);
+    if (good && s->lost) {
+        s->lost = false;
+        servo_to_arming(s);
+        if (s->o.pose_only) s->view.state = PAL_SERVO_FREE;
+        if (s->estop_latched) s->view.state = PAL_SERVO_ESTOP;
+        servo_event(s, PAL_EVENT_RECOVERED, 0, 0, "device answers again");
+    }
     if (good) {
         s->bad_reads = 0;
         /* the workspace may move only while no force is rendered */
@@ -450,14 +460,17 @@ void pal_servo_tick(pal_servo *s, uint64_t now_ns)
         }
         if (servo_states(s, now_ns, dt)) servo_render(s, now_ns, dt, force_d);
     } else if (!s->lost) {
-        /* one bad read keeps the force, more of them are a latched fault */
+        /* one bad read keeps the force; after more of them the device is lost until it answers again */
         pal_copy3(force_d, s->force_prev);
         if (++s->bad_reads >= BAD_READS_MAX) {
             s->lost = true;
+            s->has_position = false;
             s->fade = 0;
             s->view.state = PAL_SERVO_FAULT;
             s->view.n_fault++;
-            servo_event(s, PAL_EVENT_DEVICE_LOST, 0, 0, "device does not answer");
+            servo_event(s, PAL_EVENT_DEVICE_LOST, s->read_error, 0,
+                        s->read_error < 0 ? s->o.backend->strerror(s->o.device, s->read_error)
+                                          : "position of the device is not a number");
             pal_set3(force_d, 0, 0, 0);
         }
     }
@@ -467,6 +480,11 @@ void pal_servo_tick(pal_servo *s, uint64_t now_ns)
     s->o.backend->write(s->o.device, force_d, none, 0);
     pal_copy3(s->force_prev, force_d);
     servo_publish(s, now_ns, force_d);
+}
+
+bool pal_servo_device_lost(const pal_servo *servo)
+{
+    return servo->lost;
 }
 
 void pal_servo_end(pal_servo *servo)

@@ -1,0 +1,14 @@
+/* Constants of the back ends. Each has its unit, its reason and the test that bounds it. */
+#ifndef PAL_HAPTIC_BRIDGE_DEVICE_TUNING_H
+#define PAL_HAPTIC_BRIDGE_DEVICE_TUNING_H
+
+/* N, s: a pose whose every step stands still for so long under so much force comes from a frozen encoder: a hand
+ * trembles at 8 to 12 Hz by 0.1 mm, two steps of the coarsest device (tests/clients/test_device_hdapi.c) */
+#define PAL_DEVICE_FROZEN_FORCE_N 0.5
+#define PAL_DEVICE_FROZEN_S       3.0
+/* s: a lost device is tried again, and motors that are warm get force again, after this (test_device_hdapi.c) */
+#define PAL_DEVICE_RETRY_S 2.0
+/* s: force of warm motors fades out and in again as that of a stale model does (test_device_hdapi.c) */
+#define PAL_DEVICE_FADE_OUT_S 0.5
+#define PAL_DEVICE_FADE_IN_S  0.25
+#endif
