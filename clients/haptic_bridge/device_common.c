@@ -73,6 +73,14 @@ int pal_device_guard_pose(pal_device_guard *guard, const pal_dev_state *state, c
     return now - guard->since_s > PAL_DEVICE_FROZEN_S ? PAL_DEVICE_ERROR_FROZEN : 0;
 }
 
+double pal_device_fade_step(pal_device_fade *fade, bool on)
+{
+    const double now = pal_device_time_s(), dt = fade->last_s > 0 ? now - fade->last_s : 0;
+    fade->last_s = now;
+    fade->share += on ? dt / PAL_DEVICE_FADE_IN_S : -dt / PAL_DEVICE_FADE_OUT_S;
+    return fade->share = fmin(fmax(fade->share, 0), 1);
+}
+
 const char *pal_device_error_text(int error, const char *what, char text[PAL_DEVICE_TEXT])
 {
     const char *const sentence[] = {

@@ -45,6 +45,13 @@ typedef struct pal_device_guard {
 } pal_device_guard;
 int pal_device_guard_pose(pal_device_guard *guard, const pal_dev_state *state, const double force_N[3]);
 
+/* Share of the force that a device gives while it cannot give all: fades out and in at the rates of device_tuning.h, dt
+ * by pal_device_time_s. {0} is none yet */
+typedef struct pal_device_fade {
+    double share, last_s;
+} pal_device_fade;
+double pal_device_fade_step(pal_device_fade *fade, bool on);
+
 /* the sentence of a common error about `what`; NULL for an error of the back end's own */
 const char *pal_device_error_text(int error, const char *what, char text[PAL_DEVICE_TEXT]);
 

@@ -90,7 +90,8 @@ typedef struct hdapi_device {
     int error;   /* why the tick is called no more */
     int reading; /* result of read in this frame */
     double force_N[3], given_N[3];
-    double gain, warm_until_s, last_s; /* of warm motors */
+    double warm_until_s; /* motors are spared until then */
+    pal_device_fade fade;
     pal_dev_state state;
     pal_device_guard guard;
 } hdapi_device;
@@ -202,7 +203,7 @@ static int hdapi_open(void **handle, const char *id, pal_dev_info *out)
     *handle = h;
     if (!h) return PAL_DEVICE_ERROR_MEMORY;
     h->device = HD_INVALID_HANDLE;
-    h->gain = 1;
+    h->fade.share = 1;
     h->reading = PAL_DEVICE_ERROR_SILENT;
     sem_init(&h->changed, 0, 0);
     snprintf(h->name, sizeof h->name, "%s", id);
@@ -219,7 +220,7 @@ static int hdapi_reopen(void *handle)
     if (atomic_load(&h->abandoned)) return PAL_DEVICE_ERROR_SILENT;
     if (h->device != HD_INVALID_HANDLE) hd.hdDisableDevice(h->device);
     h->guard = (pal_device_guard){.since_s = pal_device_time_s()};
-    h->gain = 1;
+    h->fade = (pal_device_fade){.share = 1};
     return h->error = hdapi_init(h);
 }
 
@@ -256,15 +257,6 @@ static void hdapi_take_state(hdapi_device *h)
     h->reading = pal_device_guard_pose(&h->guard, s, h->given_N);
 }
 
-/* share of the force that warm motors are spared */
-static double hdapi_gain(hdapi_device *h)
-{
-    const double now = pal_device_time_s(), dt = h->last_s > 0 ? now - h->last_s : 0;
-    h->last_s = now;
-    h->gain += now < h->warm_until_s ? -dt / PAL_DEVICE_FADE_OUT_S : dt / PAL_DEVICE_FADE_IN_S;
-    return h->gain = fmin(fmax(h->gain, 0), 1);
-}
-
 /* one frame of the library: [servo] */
 static unsigned hdapi_on_frame(void *user)
 {
@@ -278,7 +270,8 @@ static unsigned hdapi_on_frame(void *user)
     } else
         pal_set3(h->force_N, 0, 0, 0);
     const bool off = atomic_load(&h->stopped) || !atomic_load(&h->enabled);
-    pal_scale3(h->given_N, off ? 0 : hdapi_gain(h), h->force_N);
+    const double share = pal_device_fade_step(&h->fade, pal_device_time_s() >= h->warm_until_s);
+    pal_scale3(h->given_N, off ? 0 : share, h->force_N);
     double theirs[3];
     hdapi_from_ours(theirs, h->given_N);
     hd.hdSetDoublev(HD_CURRENT_FORCE, theirs);
@@ -315,7 +308,6 @@ static int hdapi_run(void *handle, int (*tick)(void *), void *user)
     hdapi_device *h = handle;
     h->tick = tick, h->user = user;
     atomic_store(&h->ended, false);
-    h->last_s = 0;
     h->schedule = hd.hdScheduleAsynchronous(hdapi_on_frame, h, HD_PRIORITY_MAX);
     if (atomic_fetch_add(&hd_n_running, 1) == 0) hd.hdStartScheduler();
     const unsigned code = hdapi_errors();

@@ -11,4 +11,7 @@
 /* s: force of warm motors fades out and in again as that of a stale model does (test_device_hdapi.c) */
 #define PAL_DEVICE_FADE_OUT_S 0.5
 #define PAL_DEVICE_FADE_IN_S  0.25
+/* times 125 us: the firmware of a DHD device cuts the force when no command has come for 10 ms, ten ticks
+ * (test_device_dhd.c) */
+#define PAL_DEVICE_DHD_WATCHDOG 80
 #endif

@@ -104,9 +104,10 @@ static bool thread_is_lost(const pal_servo_thread *t)
 static void thread_poll(pal_servo_thread *t)
 {
     uint64_t due = pal_clock_now_ns(t->clock) + t->period_ns, missed = 0;
-    while (!thread_is_lost(t) && thread_sleep_until(t, due)) {
+    while (thread_sleep_until(t, due)) {
         const uint64_t now = pal_clock_now_ns(t->clock), late = now > due ? now - due : 0;
         thread_tick(t, now, late, missed);
+        if (thread_is_lost(t)) return;
         atomic_store(&t->idle, false);
         due += t->period_ns;
         /* missed ticks are left out, the grid of due times stays */

@@ -8,7 +8,7 @@
 #include <string.h>
 
 static const char *const fault_name[] = {"init",    "error_at",  "error",  "stall_at", "frozen_at", "nan_at",
-                                         "warm_at", "unplugged", "status", "buttons",  "wall"};
+                                         "warm_at", "unplugged", "status", "buttons",  "wall",      "force_off"};
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static pthread_cond_t changed = PTHREAD_COND_INITIALIZER;
 static void *plant;

@@ -13,6 +13,7 @@
  *   status     ints that dhdGetStatus writes                     (16)
  *   buttons    bits                                              (0)
  *   wall       1: frames come by the clock on the wall, 1,000 a second; else when the test calls for them
+ *   force_off  1: the user has switched the forces off at the device (DHD)
  * PAL_FAKE_DEVICE is the id of the virtual device ("touch,script=still,hand=off"). */
 #ifndef TESTS_FAKES_FAKE_PLANT_H
 #define TESTS_FAKES_FAKE_PLANT_H
@@ -30,6 +31,7 @@ enum {
     FAKE_STATUS,
     FAKE_BUTTONS,
     FAKE_WALL,
+    FAKE_FORCE_OFF,
     FAKE_COUNT
 };
 
