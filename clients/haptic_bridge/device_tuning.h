@@ -14,4 +14,17 @@
 /* times 125 us: the firmware of a DHD device cuts the force when no command has come for 10 ms, ten ticks
  * (test_device_dhd.c) */
 #define PAL_DEVICE_DHD_WATCHDOG 80
+/* share of full deflection that is rest: a released handle springs back to within it (test_device_input.c) */
+#define PAL_DEVICE_INPUT_DEAD 0.05
+/* counts at full deflection where the kernel does not know them; of libspnav, before its sensitivity
+ * (test_device_input.c) */
+#define PAL_DEVICE_INPUT_RANGE 500
+#define PAL_DEVICE_SPNAV_RANGE 350
+/* m/s, rad/s at full deflection: across the workspace in 2 s (test_device_input.c) */
+#define PAL_DEVICE_INPUT_SPEED_M_S  0.1
+#define PAL_DEVICE_INPUT_TURN_RAD_S 1.0
+/* m: half of the workspace, an organ and the room above it (test_device_input.c) */
+#define PAL_DEVICE_INPUT_REACH_M 0.1
+/* s: a relative axis that is held reports every 8 to 16 ms (test_device_input.c) */
+#define PAL_DEVICE_INPUT_SILENT_S 0.1
 #endif
