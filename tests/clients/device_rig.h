@@ -59,7 +59,6 @@ static inline void rig_close(device_rig *r, pal_servo_timing *timing)
     /* a tick is needed to see the end, and the test calls for none any more */
     if (r->fake) r->fake->set(FAKE_STALL_AT, 0);
     if (r->fake) r->fake->set(FAKE_WALL, 1);
-    if (r->o.info.thread_model != PAL_DEVICE_POLLED && !pal_servo_device_lost(r->servo)) r->fake->frames(0);
     pal_servo_thread_stop(r->thread, timing);
     pal_servo_destroy(r->servo);
     r->o.backend->close(r->o.device);

@@ -176,6 +176,6 @@ int dhdSetWatchdog(unsigned char n, char id)
 const fake_control *fake_entry(void)
 {
     static const fake_control *control;
-    if (!control) control = fake_common(NULL);
+    if (!control) control = fake_common(NULL, NULL);
     return control;
 }

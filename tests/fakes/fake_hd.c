@@ -273,9 +273,16 @@ static void frames(int n)
     pthread_mutex_unlock(&lock);
 }
 
+static void wake(void)
+{
+    pthread_mutex_lock(&lock);
+    pthread_cond_broadcast(&changed);
+    pthread_mutex_unlock(&lock);
+}
+
 const fake_control *fake_entry(void)
 {
     static const fake_control *control;
-    if (!control) control = fake_common(frames);
+    if (!control) control = fake_common(frames, wake);
     return control;
 }

@@ -13,6 +13,7 @@ static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static pthread_cond_t changed = PTHREAD_COND_INITIALIZER;
 static void *plant;
 static long value[FAKE_COUNT], n_frame;
+static void (*wake_fake)(void);
 static double library_force_N[3], last_m[3];
 
 static void begin(const char *device, const char *faults)
@@ -75,6 +76,7 @@ static void set(int fault, long v)
     value[fault] = v;
     pthread_cond_broadcast(&changed);
     pthread_mutex_unlock(&lock);
+    if (wake_fake) wake_fake();
 }
 static long frame(void)
 {
@@ -146,8 +148,9 @@ static void written(double force_N[3])
     pthread_mutex_unlock(&lock);
 }
 
-const fake_control *fake_common(void (*frames)(int n))
+const fake_control *fake_common(void (*frames)(int n), void (*wake)(void))
 {
+    wake_fake = wake;
     static fake_control control;
     control = (fake_control){.begin = begin,
                              .set = set,

@@ -57,5 +57,6 @@ void fake_read(double position_m[3]);
 /* one frame of dt under this force; `library`: the same in the library's own axes */
 void fake_step(double dt_s, const double force_N[3], const double library_N[3]);
 void fake_wait(void (*leave)(void), void (*enter)(void)); /* waits while a stall is due */
-const fake_control *fake_common(void (*frames)(int n));
+/* the control of a fake; wake, which may be NULL, is called after each set, so that nobody waits in vain */
+const fake_control *fake_common(void (*frames)(int n), void (*wake)(void));
 #endif

@@ -101,6 +101,6 @@ const pal_haptic_v1 *pal_haptic_entry(void)
 const fake_control *fake_entry(void)
 {
     static const fake_control *control;
-    if (!control) control = fake_common(NULL);
+    if (!control) control = fake_common(NULL, NULL);
     return control;
 }
