@@ -5,12 +5,14 @@
 
 #include <dlfcn.h>
 #include <errno.h>
+#include <glob.h>
 #include <semaphore.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 /* names and values of HDAPI, as its reference has them */
 typedef struct hd_error_info {
@@ -408,6 +410,17 @@ static int hdapi_check(void *handle, int step, char *text, size_t n)
         const char *home = getenv("GTDD_HOME");
         snprintf(text, n, "environment: GTDD_HOME %s", home ? home : "is not set: set it to the folder of the set-up");
         return home ? 1 : -1;
+    }
+    if (!handle && step == 3) {
+        /* the Touch by USB is a serial port; others are not seen here */
+        glob_t port = {0};
+        (void)glob("/dev/ttyACM*", 0, NULL, &port);
+        const bool none = port.gl_pathc == 0, may = none || access(port.gl_pathv[0], R_OK | W_OK) == 0;
+        snprintf(text, n, "permissions: %s%s",
+                 none ? "no /dev/ttyACM*, which is right for a device by Ethernet or FireWire" : port.gl_pathv[0],
+                 may ? "" : " may not be written: add your user to the group dialout, then log in again");
+        globfree(&port);
+        return may ? 1 : -1;
     }
     if (handle && step == 0) {
         const unsigned status = hd.hdCheckCalibration ? hd.hdCheckCalibration() : HD_CALIBRATION_OK;

@@ -2,6 +2,7 @@
  * one), triple buffer between them. Ends with zero force. SIGUSR1 is the emergency stop, SIGUSR2 re-arms. */
 #include "clients/haptic_bridge/bridge_net.h"
 #include "clients/haptic_bridge/device_virtual.h"
+#include "clients/haptic_bridge/doctor.h"
 #include "clients/link/end_condition.h"
 #include "server/base/flags.h"
 #include "server/base/json_members.h"
@@ -14,7 +15,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 typedef struct bridge {
@@ -61,33 +61,28 @@ static void main_stdin(void *user)
     if (read(STDIN_FILENO, byte, sizeof byte) == 0) pal_servo_estop(b->servo);
 }
 
-static int main_list(void)
-{
-    const pal_haptic_v1 *backend;
-    for (int i = 0; (backend = pal_device_backend(i)); i++) {
-        char reason[256] = "";
-        const int n = backend->probe(reason, sizeof reason);
-        printf("%s: %s%s\n", backend->name, n < 0 ? "not available: " : "", reason);
-    }
-    printf("hdapi, dhd, haply, input, plugin: not in this release\n");
-    return 0;
-}
-
-/* "virtual:touch,key=value" and the flags become back end and id */
-static pal_err main_open_device(bridge *b, pal_diagnostic *diag)
+/* "BACKEND:ID", to which the flags of the virtual hand are added when it is virtual, become back end and id */
+static pal_err main_find_device(bridge *b, char *id, size_t n_id, pal_diagnostic *diag)
 {
     const size_t n_name = strcspn(b->device, ":");
-    const char *which = b->device[n_name] ? b->device + n_name + 1 : "touch";
+    const char *which = b->device[n_name] ? b->device + n_name + 1 : "";
     pal_servo_options *o = &b->net_options.servo;
     o->backend = pal_device_find(b->device, n_name);
     if (!o->backend) return PAL_REFUSE(diag, "no back end \"%.*s\" (--list-devices)", (int)n_name, b->device);
+    const int n = o->backend != pal_device_virtual()
+                      ? snprintf(id, n_id, "%s", which)
+                      : snprintf(id, n_id, "%s,hand=%s,script=%s%s%s", which[0] ? which : "touch", b->hand, b->script,
+                                 b->options ? "," : "", b->options ? b->options : "");
+    return n < (int)n_id ? PAL_ERR_OK : PAL_REFUSE(diag, "device description is too long");
+}
+
+static pal_err main_open_device(bridge *b, pal_diagnostic *diag)
+{
     char id[256];
-    const int n = snprintf(id, sizeof id, "%s,hand=%s,script=%s%s%s", which, b->hand, b->script, b->options ? "," : "",
-                           b->options ? b->options : "");
-    if (n >= (int)sizeof id) return PAL_REFUSE(diag, "device description is too long");
+    pal_servo_options *o = &b->net_options.servo;
+    PAL_TRY(main_find_device(b, id, sizeof id, diag));
     const int error = o->backend->open(&o->device, id, &o->info);
-    if (error < 0) return PAL_REFUSE(diag, "%s: %s", id, o->backend->strerror(NULL, error));
-    return PAL_ERR_OK;
+    return error < 0 ? PAL_REFUSE(diag, "%s", o->backend->strerror(o->device, error)) : PAL_ERR_OK;
 }
 
 /* axes of the device (x to the user, y right, z up) to the world: z to up */
@@ -215,43 +210,14 @@ static int main_run(bridge *b)
     return reason ? 1 : 0;
 }
 
-/* what this machine allows, and one second of the servo with the device */
+/* 1: something is not ok */
 static int main_doctor(bridge *b)
 {
-    struct rlimit priority = {0}, locked = {0};
-    getrlimit(RLIMIT_RTPRIO, &priority);
-    getrlimit(RLIMIT_MEMLOCK, &locked);
-    main_list();
-    printf("limits: rtprio %llu%s, memlock %llu kB\n", (unsigned long long)priority.rlim_cur,
-           geteuid() == 0 ? " (root)" : "", (unsigned long long)locked.rlim_cur / 1024);
+    char id[256];
     pal_diagnostic diag = {""};
-    pal_err err = main_open_device(b, &diag);
-    pal_servo_options o = b->net_options.servo;
-    pal_dev_state state;
-    if (!err && o.backend->read(o.device, &state) < 0) err = pal_diagnostic_set(&diag, PAL_ERR_IO, "no first pose");
-    if (err) {
-        printf("device: %s\n", diag.text);
-        return 1;
-    }
-    printf("device: %s, peak %g N, continuous %g N, stiffness %g N/m; first pose %.1f %.1f %.1f mm\n", o.info.name,
-           o.info.peak_N, o.info.continuous_N, o.info.stiffness_max_N_m, state.position_m[0] * 1e3,
-           state.position_m[1] * 1e3, state.position_m[2] * 1e3);
-    o.pose_only = true;
-    o.rotation[0] = o.rotation[4] = o.rotation[8] = 1;
-    pal_servo_timing timing = {0};
-    err = pal_servo_create(&o, &b->servo);
-    if (!err) err = pal_servo_thread_start(b->servo, &o, &diag, &b->thread);
-    if (!err) sleep(1);
-    pal_servo_thread_stop(b->thread, &timing);
-    pal_servo_destroy(b->servo);
-    o.backend->close(o.device);
-    if (err) return 1;
-    printf("real time: %s%s, memory %s; %llu ticks, %llu missed, lateness p50 %.0f p99.9 %.0f max %.0f us\n",
-           timing.rt_flags & PAL_RT_FIFO ? "SCHED_FIFO" : "refused: ", timing.rt_flags & PAL_RT_FIFO ? "" : diag.text,
-           timing.rt_flags & PAL_RT_LOCKED ? "locked" : "not locked", (unsigned long long)timing.n_tick,
-           (unsigned long long)timing.n_missed, pal_jitter_at_us(&timing.lateness, 0.5),
-           pal_jitter_at_us(&timing.lateness, 0.999), (double)timing.lateness.max_ns * 1e-3);
-    return 0;
+    if (!main_find_device(b, id, sizeof id, &diag)) return pal_doctor(id, &b->net_options.servo, 1) > 0;
+    fprintf(stderr, "palpate-bridge: %s\n", diag.text);
+    return 1;
 }
 
 int main(int argc, char **argv)
@@ -270,7 +236,8 @@ int main(int argc, char **argv)
     pal_servo_options *servo = &net->servo;
     const pal_flag flag[] = {
         {"--device", "BACKEND:ID", PAL_FLAG_TEXT, &b.device, 0, 0,
-         "virtual:touch | premium | omega3 | inverse3 | falcon (virtual:touch)"},
+         "virtual:touch | premium | omega3 | inverse3 | falcon (virtual:touch)\n"
+         "hdapi:[NAME]  dhd:[NUMBER]  haply:[DEVICE][@HOST:PORT]  input:[FILE|spnav]  plugin:FILE[,ID]"},
         {"--server", "URL", PAL_FLAG_TEXT, &net->server, 0, 0, "ws://host:port/ws or lcm://group:port?ttl=0"},
         {"--session", "NAME", PAL_FLAG_TEXT, &net->session, 0, 0, "LCM: name in the channels (main)"},
         {"--name", "NAME", PAL_FLAG_TEXT, &net->name, 0, 0, "name among the members"},
@@ -291,7 +258,8 @@ int main(int argc, char **argv)
         {"--pose-only", NULL, PAL_FLAG_SWITCH, &servo->pose_only, 0, 0, "no force"},
         {"--stdin-stop", NULL, PAL_FLAG_SWITCH, &b.stdin_stop, 0, 0, "closed standard input is an emergency stop"},
         {"--list-devices", NULL, PAL_FLAG_SWITCH, &b.list, 0, 0, "which back ends there are, or why not"},
-        {"--doctor", NULL, PAL_FLAG_SWITCH, &b.doctor, 0, 0, "check limits, device and one second of servo"},
+        {"--doctor", NULL, PAL_FLAG_SWITCH, &b.doctor, 0, 0,
+         "measure limits, device and one second of servo; each line is ok or says what to do"},
     };
     const pal_flag_table table = {.program = "palpate-bridge",
                                   .usage = "[flags]",
@@ -300,7 +268,10 @@ int main(int argc, char **argv)
                                   PAL_FLAGS(flag)};
     const int code = pal_flags_parse(&table, argc, argv, &b.common, NULL, NULL);
     if (code >= 0) return code;
-    if (b.list) return main_list();
+    if (b.list) {
+        pal_doctor_list();
+        return 0;
+    }
     pal_diagnostic diag = {""};
     if (b.until_text &&
         pal_end_condition_parse(&b.until, until_name, sizeof until_name / sizeof *until_name, b.until_text, &diag))

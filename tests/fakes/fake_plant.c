@@ -24,7 +24,7 @@ static void begin(const char *device, const char *faults)
     pal_dev_info info;
     if (!device) device = getenv("PAL_FAKE_DEVICE");
     if (!faults) faults = getenv("PAL_FAKE");
-    snprintf(id, sizeof id, "%s,clock=virtual", device ? device : "touch,script=still,hand=off");
+    snprintf(id, sizeof id, "%s,clock=virtual", device ? device : "touch,script=still");
     if (plant) virtual->close(plant);
     if (virtual->open(&plant, id, &info)) {
         fprintf(stderr, "fake: no virtual device \"%s\"\n", id);

@@ -14,7 +14,7 @@
  *   buttons    bits                                              (0)
  *   wall       1: frames come by the clock on the wall, 1,000 a second; else when the test calls for them
  *   force_off  1: the user has switched the forces off at the device (DHD)
- * PAL_FAKE_DEVICE is the id of the virtual device ("touch,script=still,hand=off"). */
+ * PAL_FAKE_DEVICE is the id of the virtual device ("touch,script=still"). */
 #ifndef TESTS_FAKES_FAKE_PLANT_H
 #define TESTS_FAKES_FAKE_PLANT_H
 #include <stdbool.h>
