@@ -48,8 +48,8 @@ typedef struct pal_haptic_v1 {
     int (*read)(void *handle, pal_dev_state *state);
     int (*write)(void *handle, const double force_N[3], const double torque_N_m[3], double grip);
     /* Devices that are not polled (thread_model): calls tick at the pace of the device, from whichever thread, which
-     * reads and writes once, until it returns other than 0. < 0: the device is lost, and read fails until reopen.
-     * Returns as well when no tick follows a stop within 2 s. */
+     * reads and writes once, until it returns other than 0. < 0: the device is lost, and read fails until reopen; so
+     * it is when no tick has come for 2 s. */
     int (*run)(void *handle, int (*tick)(void *), void *user);
     int (*force_enable)(void *handle, int on);
     int (*stop)(void *handle); /* zero force and brake, until force_enable */

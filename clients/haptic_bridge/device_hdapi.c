@@ -85,7 +85,7 @@ typedef struct hdapi_device {
     int (*tick)(void *);
     void *user;
     unsigned long schedule;
-    sem_t changed; /* the tick is no longer called, or stop was */
+    sem_t changed; /* the tick is no longer called */
     atomic_bool ended, stopped, enabled, abandoned;
     _Atomic unsigned n_frame;
     /* of the library's thread while it runs */
@@ -292,7 +292,7 @@ static unsigned hdapi_on_frame(void *user)
     return HD_CALLBACK_DONE;
 }
 
-/* after a stop: false when no frame comes any more */
+/* waits for the end, at most 2 s; false: no frame has come meanwhile */
 static bool hdapi_frames_come(hdapi_device *h)
 {
     const unsigned before = atomic_load(&h->n_frame);
@@ -311,18 +311,15 @@ static int hdapi_run(void *handle, int (*tick)(void *), void *user)
     h->tick = tick, h->user = user;
     atomic_store(&h->ended, false);
     h->schedule = hd.hdScheduleAsynchronous(hdapi_on_frame, h, HD_PRIORITY_MAX);
-    if (atomic_fetch_add(&hd_n_running, 1) == 0) hd.hdStartScheduler();
     const unsigned code = hdapi_errors();
-    if (code) h->error = -(int)code;
-    while (!h->error && !atomic_load(&h->ended)) {
-        while (sem_wait(&h->changed)) {
-        }
-        if (!atomic_load(&h->ended) && !hdapi_frames_come(h)) {
-            /* the library hangs, and what is called in it would as well: it is left alone */
-            atomic_store(&h->abandoned, true);
-            h->reading = PAL_DEVICE_ERROR_SILENT;
-            return h->error = PAL_DEVICE_ERROR_SILENT;
-        }
+    if (code) return h->error = -(int)code;
+    if (atomic_fetch_add(&hd_n_running, 1) == 0) hd.hdStartScheduler();
+    /* from here on the library's thread has its errors, and ours, until it has ended */
+    while (!atomic_load(&h->ended)) {
+        if (hdapi_frames_come(h)) continue;
+        /* the library hangs, and what is called in it would as well: it is left alone */
+        atomic_store(&h->abandoned, true);
+        return PAL_DEVICE_ERROR_SILENT;
     }
     hd.hdUnschedule(h->schedule);
     if (atomic_fetch_sub(&hd_n_running, 1) == 1) hd.hdStopScheduler();
@@ -333,6 +330,7 @@ static int hdapi_run(void *handle, int (*tick)(void *), void *user)
 static int hdapi_read(void *handle, pal_dev_state *state)
 {
     hdapi_device *h = handle;
+    if (atomic_load(&h->abandoned)) return PAL_DEVICE_ERROR_SILENT;
     *state = h->state;
     return h->error ? h->error : h->reading;
 }
@@ -356,7 +354,7 @@ static int hdapi_stop(void *handle)
 {
     hdapi_device *h = handle;
     atomic_store(&h->stopped, true);
-    return sem_post(&h->changed);
+    return 0;
 }
 
 static void hdapi_close(void *handle)

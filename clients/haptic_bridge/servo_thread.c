@@ -202,8 +202,6 @@ static void thread_join(pal_servo_thread *t)
 {
     atomic_store(&t->stop, true);
     pal_clock_wake(t->clock);
-    /* a device that calls no more does not see the flag */
-    if (t->options.info.thread_model != PAL_DEVICE_POLLED) t->options.backend->stop(t->options.device);
     pthread_join(t->loop, NULL);
     if (t->has_watchdog) pthread_join(t->watchdog, NULL);
 }

@@ -206,6 +206,35 @@ static void stalled_library_is_stopped_by_the_watchdog_and_arms_again(void)
     CHECK(timing.n_missed >= 49);
 }
 
+/* run gives the library 2 s of the wall's clock; then it is left alone, and taken back when it returns */
+static void library_that_hangs_is_lost_until_it_returns(void)
+{
+    REQUIRE(pressing());
+    rig.fake->set_in(FAKE_STALL_AT, 1);
+    rig_ticks(&rig, 2);
+    rig_wait(&rig, 50, 1);
+    rig_wait(&rig, 1, 2); /* when both sleep, run has returned */
+    CHECK_INT(rig.n_lost, 1);
+    CHECK_TEXT(rig.lost, "device \"default\" of libHD.so: it has stopped answering");
+    rig_wait(&rig, 2500, 2);
+    CHECK_INT(rig.n_lost, 1);
+    CHECK_INT(rig.n_back, 0);
+    rig.fake->set(FAKE_BUTTONS, 0);
+    const long before = rig.fake->frame();
+    rig.fake->set(FAKE_STALL_AT, 0);
+    rig.fake->settle();
+    CHECK_INT(rig.fake->frame() - before, 1); /* the frame that hung, without force */
+    double written[3];
+    rig.fake->written(written);
+    CHECK_NEAR(written[1], 0, 0);
+    rig_wait(&rig, 1400, 2);
+    manual_clock_advance(&rig.clock, 200 * RIG_MS_NS);
+    rig_ticks(&rig, 100);
+    CHECK_INT(rig.n_back, 1);
+    CHECK_INT(rig.view.state, PAL_SERVO_ARMING);
+    rig_close(&rig, NULL);
+}
+
 static void position_that_is_no_number_takes_the_force(void)
 {
     REQUIRE(pressing());
@@ -257,6 +286,7 @@ int main(void)
     RUN(error_after_frames_ends_with_its_code);
     RUN(warm_motors_fade_out_and_have_force_again_two_seconds_later);
     RUN(stalled_library_is_stopped_by_the_watchdog_and_arms_again);
+    RUN(library_that_hangs_is_lost_until_it_returns);
     RUN(position_that_is_no_number_takes_the_force);
     RUN(frozen_encoder_takes_the_force_after_three_seconds);
     RUN(hand_that_strokes_is_no_frozen_encoder);

@@ -242,7 +242,9 @@ static void *schedule(void *user)
 void hdStartScheduler(void)
 {
     if (running) raise_error(0x102);
+    pthread_mutex_lock(&lock);
     stopping = false;
+    pthread_mutex_unlock(&lock);
     if (!running) running = pthread_create(&thread, NULL, schedule, NULL) == 0;
 }
 #ifndef FAKE_WITHOUT_STOP
@@ -273,6 +275,13 @@ static void frames(int n)
     pthread_mutex_unlock(&lock);
 }
 
+static void settle(void)
+{
+    pthread_mutex_lock(&lock);
+    while (has_callback()) pthread_cond_wait(&changed, &lock);
+    pthread_mutex_unlock(&lock);
+}
+
 static void wake(void)
 {
     pthread_mutex_lock(&lock);
@@ -282,7 +291,10 @@ static void wake(void)
 
 const fake_control *fake_entry(void)
 {
-    static const fake_control *control;
-    if (!control) control = fake_common(frames, wake);
+    static fake_control *control;
+    if (!control) {
+        control = fake_common(frames, wake);
+        control->settle = settle;
+    }
     return control;
 }

@@ -148,7 +148,7 @@ static void written(double force_N[3])
     pthread_mutex_unlock(&lock);
 }
 
-const fake_control *fake_common(void (*frames)(int n), void (*wake)(void))
+fake_control *fake_common(void (*frames)(int n), void (*wake)(void))
 {
     wake_fake = wake;
     static fake_control control;

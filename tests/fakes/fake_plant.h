@@ -40,6 +40,7 @@ typedef struct fake_control {
     void (*set)(int fault, long value);
     void (*set_in)(int fault, long frames); /* the number of the frame that is so far away */
     void (*frames)(int n); /* n frames, in their own thread where the library has one; waits for them */
+    void (*settle)(void);  /* waits until the library's thread has nobody to call; NULL: it has no thread */
     long (*frame)(void);   /* frames so far */
     void (*place)(const double position_m[3]);
     void (*push)(const double force_N[3]);
@@ -58,5 +59,5 @@ void fake_read(double position_m[3]);
 void fake_step(double dt_s, const double force_N[3], const double library_N[3]);
 void fake_wait(void (*leave)(void), void (*enter)(void)); /* waits while a stall is due */
 /* the control of a fake; wake, which may be NULL, is called after each set, so that nobody waits in vain */
-const fake_control *fake_common(void (*frames)(int n), void (*wake)(void));
+fake_control *fake_common(void (*frames)(int n), void (*wake)(void));
 #endif
