@@ -30,18 +30,23 @@ typedef struct bridge {
     char rt_refused[160];
     const char *until_text;
     pal_end_condition until;
+    const char *second_device; /* NULL: one device */
+    struct bridge *second;     /* the same for it, on the same loop; NULL: none */
 } bridge;
 
 /* what --until may wait for, in the order of main_watch */
 static const char *const until_name[] = {"models", "poses", "force_N", "stale", "free"};
 
 /* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
-static pal_servo *_Atomic main_servo; /* for the emergency stop */
+static pal_servo *_Atomic main_servo[2]; /* for the emergency stop */
 
 static void main_on_signal(int number)
 {
-    if (number == SIGUSR1 && main_servo) pal_servo_estop(main_servo);
-    if (number == SIGUSR2 && main_servo) pal_servo_rearm(main_servo);
+    for (int i = 0; i < 2; i++) {
+        pal_servo *servo = main_servo[i];
+        if (number == SIGUSR1 && servo) pal_servo_estop(servo);
+        if (number == SIGUSR2 && servo) pal_servo_rearm(servo);
+    }
 }
 
 static void main_watch(void *user)
@@ -58,7 +63,9 @@ static void main_stdin(void *user)
 {
     char byte[64];
     bridge *b = user;
-    if (read(STDIN_FILENO, byte, sizeof byte) == 0) pal_servo_estop(b->servo);
+    if (read(STDIN_FILENO, byte, sizeof byte) != 0) return;
+    pal_servo_estop(b->servo);
+    if (b->second && b->second->servo) pal_servo_estop(b->second->servo);
 }
 
 /* "BACKEND:ID", to which the flags of the virtual hand are added when it is virtual, become back end and id */
@@ -110,13 +117,13 @@ static cJSON *times_json(const pal_jitter *j)
                     {"max", JSON_NUMBER((double)j->max_ns * 1e-3)});
 }
 
-static void main_json(const bridge *b, const pal_servo_timing *t, const pal_servo_view *v,
-                      const pal_bridge_net_counts *c, const char *reason)
+static cJSON *main_json(const bridge *b, const pal_servo_timing *t, const pal_servo_view *v,
+                        const pal_bridge_net_counts *c, const char *reason)
 {
     const char *forces = t->rt_flags & PAL_RT_OFF       ? "off: servo loop is late"
                          : t->rt_flags & PAL_RT_LIMITED ? "limited: servo loop is late"
                                                         : "full";
-    cJSON *report = PAL_JSON(
+    return PAL_JSON(
         {"ok", JSON_BOOL(reason == NULL)}, {"reason", reason ? JSON_TEXT(reason) : NULL},
         {"device", JSON_TEXT(b->net_options.servo.info.name)}, {"rate_hz", JSON_NUMBER(b->net_options.servo.rate_hz)},
         {"fifo", JSON_BOOL(t->rt_flags & PAL_RT_FIFO)}, {"memory_locked", JSON_BOOL(t->rt_flags & PAL_RT_LOCKED)},
@@ -131,7 +138,6 @@ static void main_json(const bridge *b, const pal_servo_timing *t, const pal_serv
         {"faults", JSON_NUMBER(v->n_fault)}, {"not_finite", JSON_NUMBER(v->n_not_finite)},
         {"poses", JSON_NUMBER(c->n_pose)}, {"tool", JSON_NUMBER(c->tool)}, {"joined", JSON_BOOL(c->joined)},
         {"position_m", cJSON_CreateDoubleArray(v->position_m, 3)});
-    (void)pal_json_write(stdout, report);
 }
 
 static void main_table(const bridge *b, const pal_servo_timing *t, const pal_servo_view *v,
@@ -165,47 +171,95 @@ static pal_err main_start(bridge *b, pal_diagnostic *diag)
     o->clock = o->backend == pal_device_virtual() ? pal_virtual_clock(o->device) : NULL;
     o->no_watchdog = o->clock != NULL;
     PAL_TRY(pal_servo_create(o, &b->servo));
-    main_servo = b->servo;
-    PAL_TRY(pal_link_loop_create(&b->loop));
-    PAL_TRY(pal_link_stop_on_signals(b->loop));
+    main_servo[main_servo[0] != NULL] = b->servo;
     pal_diagnostic refused = {""};
     PAL_TRY(pal_servo_thread_start(b->servo, o, &refused, &b->thread));
     snprintf(b->rt_refused, sizeof b->rt_refused, "%s", refused.text);
     if (refused.text[0])
         pal_log(PAL_LOG_WARN, "real_time", "%s: forces are limited when the loop is late", refused.text);
     PAL_TRY(pal_bridge_net_open(b->loop, b->servo, b->thread, &b->net_options, diag, &b->net));
+    return PAL_ERR_OK;
+}
+
+/* both devices on one loop; the end condition looks at the first */
+static pal_err main_start_all(bridge *b, pal_diagnostic *diag)
+{
+    PAL_TRY(pal_link_loop_create(&b->loop));
+    PAL_TRY(pal_link_stop_on_signals(b->loop));
+    if (b->second) b->second->loop = b->loop;
+    PAL_TRY(main_start(b, diag));
+    if (b->second) PAL_TRY(main_start(b->second, diag));
     if (b->stdin_stop) PAL_TRY(pal_link_poll_fd(b->loop, STDIN_FILENO, main_stdin, b));
     return pal_link_add_timer(b->loop, 50000, main_watch, b) ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+/* what is reported of a device at the end */
+typedef struct bridge_end {
+    pal_servo_timing timing;
+    pal_servo_view view;
+    pal_bridge_net_counts counts;
+    char reason[sizeof((pal_diagnostic *)0)->text]; /* "": it ended well */
+} bridge_end;
+
+static void main_stop(bridge *b, pal_err err, const char *text, bridge_end *end)
+{
+    *end = (bridge_end){0};
+    pal_servo_thread_stop(b->thread, &end->timing);
+    if (b->net) {
+        end->view = *pal_bridge_net_view(b->net);
+        end->counts = pal_bridge_net_count(b->net);
+    }
+    if (err)
+        snprintf(end->reason, sizeof end->reason, "%s", text[0] ? text : pal_err_text(err));
+    else if (!end->counts.joined)
+        snprintf(end->reason, sizeof end->reason, "no server at %.100s: %.60s", b->net_options.server,
+                 end->counts.reason[0] ? end->counts.reason : "no answer");
+}
+
+static void main_close(bridge *b)
+{
+    const pal_servo_options *o = &b->net_options.servo;
+    pal_bridge_net_close(b->net);
+    pal_servo_destroy(b->servo);
+    if (o->device) o->backend->close(o->device);
 }
 
 static int main_run(bridge *b)
 {
     pal_diagnostic diag = {""};
-    pal_err err = main_start(b, &diag);
+    static bridge second;
+    static char second_tool[16];
+    if (b->second_device) {
+        second = *b;
+        second.device = b->second_device;
+        /* LCM gives no tools away, and who names one names the next as well */
+        if (strcmp(b->tool, "any") || !strncmp(b->net_options.server, "lcm", 3)) {
+            snprintf(second_tool, sizeof second_tool, "%d", atoi(b->tool) + 1);
+            second.tool = second_tool;
+        }
+        b->second = &second;
+    }
+    const pal_err err = main_start_all(b, &diag);
     if (!err) pal_link_run_for(b->loop, b->seconds);
-    pal_servo_timing timing = {0};
-    pal_servo_view view = {0};
-    pal_bridge_net_counts counts = {0};
-    pal_servo_thread_stop(b->thread, &timing);
-    if (b->net) {
-        view = *pal_bridge_net_view(b->net);
-        counts = pal_bridge_net_count(b->net);
-    }
-    main_servo = NULL;
+    bridge *device[] = {b, b->second};
+    static bridge_end end[2];
+    for (int i = 0; i < 2 && device[i]; i++) main_stop(device[i], err, diag.text, &end[i]);
+    main_servo[0] = main_servo[1] = NULL;
     pal_link_loop_destroy(b->loop);
-    pal_bridge_net_close(b->net);
-    pal_servo_destroy(b->servo);
-    const pal_servo_options *o = &b->net_options.servo;
-    if (o->device) o->backend->close(o->device);
-    const char *reason = err ? (diag.text[0] ? diag.text : pal_err_text(err)) : NULL;
-    char lost[192];
-    if (!err && !counts.joined) {
-        snprintf(lost, sizeof lost, "no server at %.100s: %.60s", b->net_options.server,
-                 counts.reason[0] ? counts.reason : "no answer");
-        reason = lost;
+    for (int i = 0; i < 2 && device[i]; i++) main_close(device[i]);
+    const char *reason = end[0].reason[0] ? end[0].reason : end[1].reason[0] ? end[1].reason : NULL;
+    cJSON *report = NULL;
+    for (int i = 0; i < 2 && device[i]; i++) {
+        if (!b->common.json && !b->common.quiet && !err)
+            main_table(device[i], &end[i].timing, &end[i].view, &end[i].counts);
+        if (!b->common.json) continue;
+        cJSON *one = main_json(device[i], &end[i].timing, &end[i].view, &end[i].counts, reason);
+        if (i == 0)
+            report = one;
+        else
+            cJSON_AddItemToObject(report, "second", one);
     }
-    if (b->common.json) main_json(b, &timing, &view, &counts, reason);
-    if (!b->common.json && !b->common.quiet && !err) main_table(b, &timing, &view, &counts);
+    if (report) (void)pal_json_write(stdout, report);
     if (reason) fprintf(stderr, "palpate-bridge: %s\n", reason);
     return reason ? 1 : 0;
 }
@@ -238,6 +292,8 @@ int main(int argc, char **argv)
         {"--device", "BACKEND:ID", PAL_FLAG_TEXT, &b.device, 0, 0,
          "virtual:touch | premium | omega3 | inverse3 | falcon (virtual:touch)\n"
          "hdapi:[NAME]  dhd:[NUMBER]  haply:[DEVICE][@HOST:PORT]  input:[FILE|spnav]  plugin:FILE[,ID]"},
+        {"--second-device", "BACKEND:ID", PAL_FLAG_TEXT, &b.second_device, 0, 0,
+         "for the other hand, with the next tool"},
         {"--server", "URL", PAL_FLAG_TEXT, &net->server, 0, 0, "ws://host:port/ws or lcm://group:port?ttl=0"},
         {"--session", "NAME", PAL_FLAG_TEXT, &net->session, 0, 0, "LCM: name in the channels (main)"},
         {"--name", "NAME", PAL_FLAG_TEXT, &net->name, 0, 0, "name among the members"},

@@ -34,6 +34,11 @@ check "a device by dlopen joins a session" $? == 0
 check "under its own name" "$(grep -c 'Fake Touch' "$work/joined")" == 1
 check "models come" "$(json models "$work/joined")" '>' 10
 check "poses go out" "$(json poses "$work/joined")" '>' 100
+PAL_FAKE=wall=1 bridge --server "$url" --device "$(device premium)" --second-device hdapi: --seconds 50 \
+    --until models=11,poses=101 --json >"$work/both" 2>"$work/both.err"
+check "two devices join a session" $? == 0
+check "with a tool each" "$(tr ',{}' '\n\n\n' <"$work/both" | grep '^"tool":[0-9]' | sort -u | wc -l)" == 2
+check "and a report each" "$(grep -c 'virtual Premium.*"second":{.*Fake Touch' "$work/both")" == 1
 PAL_FAKE=wall=1,error=0x302,error_at=500 bridge --server "$url" --device hdapi: --seconds 50 >"$work/lost" 2>"$work/lost.err" &
 job=$!
 shows "$work/lost.err" $job 'error 0x302'
