@@ -121,4 +121,11 @@ static inline double rig_motor_force(const device_rig *r)
     r->fake->truth(NULL, force_N);
     return sqrt(force_N[0] * force_N[0] + force_N[1] * force_N[1] + force_N[2] * force_N[2]);
 }
+
+/* until the motors give more than that, at most 2 s */
+static inline bool rig_until_force(device_rig *r, double force_N)
+{
+    for (int i = 0; i < 2000 && rig_motor_force(r) <= force_N; i++) rig_tick(r);
+    return rig_motor_force(r) > force_N;
+}
 #endif
