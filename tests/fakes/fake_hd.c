@@ -6,6 +6,7 @@
 #include "tests/fakes/fake_plant.h"
 
 #include <pthread.h>
+#include <stdatomic.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -26,7 +27,7 @@ static struct {
     callback call;
     void *user;
 } scheduled[CALLBACKS];
-static unsigned pending;
+static _Atomic unsigned pending; /* one error, of all threads */
 static double force_hd[3];
 
 #define EXPORT __attribute__((visibility("default")))
@@ -51,7 +52,8 @@ EXPORT const fake_control *fake_entry(void);
 
 static void raise_error(unsigned code)
 {
-    if (!pending) pending = code;
+    unsigned none = 0;
+    atomic_compare_exchange_strong(&pending, &none, code);
 }
 
 unsigned hdInitDevice(const char *name)
@@ -93,9 +95,7 @@ void hdEndFrame(unsigned device)
 }
 error_info hdGetError(void)
 {
-    const error_info info = {.code = pending, .device = 0};
-    pending = 0;
-    return info;
+    return (error_info){.code = atomic_exchange(&pending, 0)};
 }
 void hdEnable(unsigned what)
 {
