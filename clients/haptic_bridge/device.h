@@ -2,8 +2,9 @@
  * `const pal_haptic_v1 *pal_haptic_entry(void)`. Every back end implements this table.
  *
  * Units: m, m/s, N, N m, s. Device axes: x to the user, y right, z up; origin at the centre of its workspace. Return
- * values: 0 ok, > 0 warning, < 0 error (text from strerror). Thread: probe, open, close, force_enable [load]; read and
- * write [servo]; stop [any], async-signal-safe. */
+ * values: 0 ok, > 0 warning, < 0 error (text from strerror). Thread: probe, open, reopen, close, check, force_enable
+ * [load]; run, read and write [servo]; stop [any], async-signal-safe; strerror: the thread that got the error. Between
+ * open and close [servo] calls reopen, while there are no ticks. */
 #ifndef PAL_HAPTIC_BRIDGE_DEVICE_H
 #define PAL_HAPTIC_BRIDGE_DEVICE_H
 #include <stddef.h>
@@ -34,20 +35,31 @@ typedef struct pal_dev_state {
     double grip;              /* gripper opening, rad or m */
     uint64_t stamp_us;        /* device clock */
     double motor_temperature; /* fraction of the limit; 0: unknown */
+    int32_t has_force;        /* 1: force_N is what the device gives, less than written where it limits or filters */
+    double force_N[3];
 } pal_dev_state;
 
 typedef struct pal_haptic_v1 {
     uint32_t abi, size;                   /* PAL_HAPTIC_ABI, sizeof of this table */
     const char *name;                     /* "virtual"                              */
-    int (*probe)(char *reason, size_t n); /* returns the number of devices, or < 0 with the reason in `reason` */
-    int (*open)(void **handle, const char *id, pal_dev_info *out); /* id: the text after "name:" */
+    int (*probe)(char *reason, size_t n); /* returns the number of devices, or < 0; both with a sentence in `reason` */
+    /* id: the text after "name:". < 0: *handle may be set all the same, for strerror, and is to be closed then */
+    int (*open)(void **handle, const char *id, pal_dev_info *out);
     int (*read)(void *handle, pal_dev_state *state);
     int (*write)(void *handle, const double force_N[3], const double torque_N_m[3], double grip);
-    int (*run)(void *handle, int (*tick)(void *), void *user); /* callback and request-reply devices; else NULL */
+    /* Devices that are not polled (thread_model): calls tick at the pace of the device, from whichever thread, which
+     * reads and writes once, until it returns other than 0. < 0: the device is lost, and read fails until reopen; so
+     * it is when no tick has come for 2 s. */
+    int (*run)(void *handle, int (*tick)(void *), void *user);
     int (*force_enable)(void *handle, int on);
-    int (*stop)(void *handle); /* zero force and brake */
+    int (*stop)(void *handle); /* zero force and brake, until force_enable */
     void (*close)(void *handle);
-    const char *(*strerror)(void *handle, int error);
+    const char *(*strerror)(void *handle, int error); /* one sentence */
+    /* the rest may be NULL, or missing from the table of a plug-in (size) */
+    int (*reopen)(void *handle); /* connects a lost device again; < 0: not yet */
+    /* Step 0, 1, ... of an examination, first with a NULL handle, then with an open one: 1 good, 0 no more steps, -1
+     * not good. text: "library: what was found, or what to do" */
+    int (*check)(void *handle, int step, char *text, size_t n);
 } pal_haptic_v1;
 
 /* back ends of this build; NULL beyond the last */

@@ -2,6 +2,7 @@
  * one), triple buffer between them. Ends with zero force. SIGUSR1 is the emergency stop, SIGUSR2 re-arms. */
 #include "clients/haptic_bridge/bridge_net.h"
 #include "clients/haptic_bridge/device_virtual.h"
+#include "clients/haptic_bridge/doctor.h"
 #include "clients/link/end_condition.h"
 #include "server/base/flags.h"
 #include "server/base/json_members.h"
@@ -14,7 +15,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 typedef struct bridge {
@@ -32,18 +32,23 @@ typedef struct bridge {
     pal_end_condition until;
     int n_held; /* samples of the script grasp while it holds, and sums of what device and tissue gave */
     double rendered_N, reference_N;
+    const char *second_device; /* NULL: one device */
+    struct bridge *second;     /* the same for it, on the same loop; NULL: none */
 } bridge;
 
 /* what --until may wait for, in the order of main_watch */
 static const char *const until_name[] = {"models", "poses", "force_N", "stale", "free"};
 
 /* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
-static pal_servo *_Atomic main_servo; /* for the emergency stop */
+static pal_servo *_Atomic main_servo[2]; /* for the emergency stop */
 
 static void main_on_signal(int number)
 {
-    if (number == SIGUSR1 && main_servo) pal_servo_estop(main_servo);
-    if (number == SIGUSR2 && main_servo) pal_servo_rearm(main_servo);
+    for (int i = 0; i < 2; i++) {
+        pal_servo *servo = main_servo[i];
+        if (number == SIGUSR1 && servo) pal_servo_estop(servo);
+        if (number == SIGUSR2 && servo) pal_servo_rearm(servo);
+    }
 }
 
 /* the script grasp: what is rendered and what the tissue gives while the hand holds; ends the program when it is done
@@ -75,36 +80,33 @@ static void main_stdin(void *user)
 {
     char byte[64];
     bridge *b = user;
-    if (read(STDIN_FILENO, byte, sizeof byte) == 0) pal_servo_estop(b->servo);
+    if (read(STDIN_FILENO, byte, sizeof byte) != 0) return;
+    pal_servo_estop(b->servo);
+    if (b->second && b->second->servo) pal_servo_estop(b->second->servo);
 }
 
-static int main_list(void)
-{
-    const pal_haptic_v1 *backend;
-    for (int i = 0; (backend = pal_device_backend(i)); i++) {
-        char reason[256] = "";
-        const int n = backend->probe(reason, sizeof reason);
-        printf("%s: %s%s\n", backend->name, n < 0 ? "not available: " : "", reason);
-    }
-    printf("hdapi, dhd, haply, input, plugin: not in this release\n");
-    return 0;
-}
-
-/* "virtual:touch,key=value" and the flags become back end and id */
-static pal_err main_open_device(bridge *b, pal_diagnostic *diag)
+/* "BACKEND:ID", to which the flags of the virtual hand are added when it is virtual, become back end and id */
+static pal_err main_find_device(bridge *b, char *id, size_t n_id, pal_diagnostic *diag)
 {
     const size_t n_name = strcspn(b->device, ":");
-    const char *which = b->device[n_name] ? b->device + n_name + 1 : "touch";
+    const char *which = b->device[n_name] ? b->device + n_name + 1 : "";
     pal_servo_options *o = &b->net_options.servo;
     o->backend = pal_device_find(b->device, n_name);
     if (!o->backend) return PAL_REFUSE(diag, "no back end \"%.*s\" (--list-devices)", (int)n_name, b->device);
+    const int n = o->backend != pal_device_virtual()
+                      ? snprintf(id, n_id, "%s", which)
+                      : snprintf(id, n_id, "%s,hand=%s,script=%s%s%s", which[0] ? which : "touch", b->hand, b->script,
+                                 b->options ? "," : "", b->options ? b->options : "");
+    return n < (int)n_id ? PAL_ERR_OK : PAL_REFUSE(diag, "device description is too long");
+}
+
+static pal_err main_open_device(bridge *b, pal_diagnostic *diag)
+{
     char id[256];
-    const int n = snprintf(id, sizeof id, "%s,hand=%s,script=%s%s%s", which, b->hand, b->script, b->options ? "," : "",
-                           b->options ? b->options : "");
-    if (n >= (int)sizeof id) return PAL_REFUSE(diag, "device description is too long");
+    pal_servo_options *o = &b->net_options.servo;
+    PAL_TRY(main_find_device(b, id, sizeof id, diag));
     const int error = o->backend->open(&o->device, id, &o->info);
-    if (error < 0) return PAL_REFUSE(diag, "%s: %s", id, o->backend->strerror(NULL, error));
-    return PAL_ERR_OK;
+    return error < 0 ? PAL_REFUSE(diag, "%s", o->backend->strerror(o->device, error)) : PAL_ERR_OK;
 }
 
 /* place and axes of the workspace, as far as they are known before hello */
@@ -136,13 +138,13 @@ static cJSON *grasp_json(const bridge *b)
                     {"server_N", JSON_NUMBER(b->reference_N / b->n_held)});
 }
 
-static void main_json(const bridge *b, const pal_servo_timing *t, const pal_servo_view *v,
-                      const pal_bridge_net_counts *c, const char *reason)
+static cJSON *main_json(const bridge *b, const pal_servo_timing *t, const pal_servo_view *v,
+                        const pal_bridge_net_counts *c, const char *reason)
 {
     const char *forces = t->rt_flags & PAL_RT_OFF       ? "off: servo loop is late"
                          : t->rt_flags & PAL_RT_LIMITED ? "limited: servo loop is late"
                                                         : "full";
-    cJSON *report = PAL_JSON(
+    return PAL_JSON(
         {"ok", JSON_BOOL(reason == NULL)}, {"reason", reason ? JSON_TEXT(reason) : NULL},
         {"device", JSON_TEXT(b->net_options.servo.info.name)}, {"rate_hz", JSON_NUMBER(b->net_options.servo.rate_hz)},
         {"fifo", JSON_BOOL(t->rt_flags & PAL_RT_FIFO)}, {"memory_locked", JSON_BOOL(t->rt_flags & PAL_RT_LOCKED)},
@@ -159,7 +161,6 @@ static void main_json(const bridge *b, const pal_servo_timing *t, const pal_serv
         {"faults", JSON_NUMBER(v->n_fault)}, {"not_finite", JSON_NUMBER(v->n_not_finite)},
         {"poses", JSON_NUMBER(c->n_pose)}, {"tool", JSON_NUMBER(c->tool)}, {"joined", JSON_BOOL(c->joined)},
         {"position_m", cJSON_CreateDoubleArray(v->position_m, 3)});
-    (void)pal_json_write(stdout, report);
 }
 
 static void main_table(const bridge *b, const pal_servo_timing *t, const pal_servo_view *v,
@@ -197,88 +198,107 @@ static pal_err main_start(bridge *b, pal_diagnostic *diag)
     o->clock = o->backend == pal_device_virtual() ? pal_virtual_clock(o->device) : NULL;
     o->no_watchdog = o->clock != NULL;
     PAL_TRY(pal_servo_create(o, &b->servo));
-    main_servo = b->servo;
-    PAL_TRY(pal_link_loop_create(&b->loop));
-    PAL_TRY(pal_link_stop_on_signals(b->loop));
+    main_servo[main_servo[0] != NULL] = b->servo;
     pal_diagnostic refused = {""};
     PAL_TRY(pal_servo_thread_start(b->servo, o, &refused, &b->thread));
     snprintf(b->rt_refused, sizeof b->rt_refused, "%s", refused.text);
     if (refused.text[0])
         pal_log(PAL_LOG_WARN, "real_time", "%s: forces are limited when the loop is late", refused.text);
     PAL_TRY(pal_bridge_net_open(b->loop, b->servo, b->thread, &b->net_options, diag, &b->net));
+    return PAL_ERR_OK;
+}
+
+/* both devices on one loop; the end condition looks at the first */
+static pal_err main_start_all(bridge *b, pal_diagnostic *diag)
+{
+    PAL_TRY(pal_link_loop_create(&b->loop));
+    PAL_TRY(pal_link_stop_on_signals(b->loop));
+    if (b->second) b->second->loop = b->loop;
+    PAL_TRY(main_start(b, diag));
+    if (b->second) PAL_TRY(main_start(b->second, diag));
     if (b->stdin_stop) PAL_TRY(pal_link_poll_fd(b->loop, STDIN_FILENO, main_stdin, b));
     return pal_link_add_timer(b->loop, 50000, main_watch, b) ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+/* what is reported of a device at the end */
+typedef struct bridge_end {
+    pal_servo_timing timing;
+    pal_servo_view view;
+    pal_bridge_net_counts counts;
+    char reason[sizeof((pal_diagnostic *)0)->text]; /* "": it ended well */
+} bridge_end;
+
+static void main_stop(bridge *b, pal_err err, const char *text, bridge_end *end)
+{
+    *end = (bridge_end){0};
+    pal_servo_thread_stop(b->thread, &end->timing);
+    if (b->net) {
+        end->view = *pal_bridge_net_view(b->net);
+        end->counts = pal_bridge_net_count(b->net);
+    }
+    if (err)
+        snprintf(end->reason, sizeof end->reason, "%s", text[0] ? text : pal_err_text(err));
+    else if (!end->counts.joined)
+        snprintf(end->reason, sizeof end->reason, "no server at %.100s: %.60s", b->net_options.server,
+                 end->counts.reason[0] ? end->counts.reason : "no answer");
+}
+
+static void main_close(bridge *b)
+{
+    const pal_servo_options *o = &b->net_options.servo;
+    pal_bridge_net_close(b->net);
+    pal_servo_destroy(b->servo);
+    if (o->device) o->backend->close(o->device);
 }
 
 static int main_run(bridge *b)
 {
     pal_diagnostic diag = {""};
-    pal_err err = main_start(b, &diag);
+    static bridge second;
+    static char second_tool[16];
+    if (b->second_device) {
+        second = *b;
+        second.device = b->second_device;
+        /* LCM gives no tools away, and who names one names the next as well */
+        if (strcmp(b->tool, "any") || !strncmp(b->net_options.server, "lcm", 3)) {
+            snprintf(second_tool, sizeof second_tool, "%d", atoi(b->tool) + 1);
+            second.tool = second_tool;
+        }
+        b->second = &second;
+    }
+    const pal_err err = main_start_all(b, &diag);
     if (!err) pal_link_run_for(b->loop, b->seconds);
-    pal_servo_timing timing = {0};
-    pal_servo_view view = {0};
-    pal_bridge_net_counts counts = {0};
-    pal_servo_thread_stop(b->thread, &timing);
-    if (b->net) {
-        view = *pal_bridge_net_view(b->net);
-        counts = pal_bridge_net_count(b->net);
-    }
-    main_servo = NULL;
+    bridge *device[] = {b, b->second};
+    static bridge_end end[2];
+    for (int i = 0; i < 2 && device[i]; i++) main_stop(device[i], err, diag.text, &end[i]);
+    main_servo[0] = main_servo[1] = NULL;
     pal_link_loop_destroy(b->loop);
-    pal_bridge_net_close(b->net);
-    pal_servo_destroy(b->servo);
-    const pal_servo_options *o = &b->net_options.servo;
-    if (o->device) o->backend->close(o->device);
-    const char *reason = err ? (diag.text[0] ? diag.text : pal_err_text(err)) : NULL;
-    char lost[192];
-    if (!err && !counts.joined) {
-        snprintf(lost, sizeof lost, "no server at %.100s: %.60s", b->net_options.server,
-                 counts.reason[0] ? counts.reason : "no answer");
-        reason = lost;
+    for (int i = 0; i < 2 && device[i]; i++) main_close(device[i]);
+    const char *reason = end[0].reason[0] ? end[0].reason : end[1].reason[0] ? end[1].reason : NULL;
+    cJSON *report = NULL;
+    for (int i = 0; i < 2 && device[i]; i++) {
+        if (!b->common.json && !b->common.quiet && !err)
+            main_table(device[i], &end[i].timing, &end[i].view, &end[i].counts);
+        if (!b->common.json) continue;
+        cJSON *one = main_json(device[i], &end[i].timing, &end[i].view, &end[i].counts, reason);
+        if (i == 0)
+            report = one;
+        else
+            cJSON_AddItemToObject(report, "second", one);
     }
-    if (b->common.json) main_json(b, &timing, &view, &counts, reason);
-    if (!b->common.json && !b->common.quiet && !err) main_table(b, &timing, &view, &counts);
+    if (report) (void)pal_json_write(stdout, report);
     if (reason) fprintf(stderr, "palpate-bridge: %s\n", reason);
     return reason ? 1 : 0;
 }
 
-/* what this machine allows, and one second of the servo with the device */
+/* 1: something is not ok */
 static int main_doctor(bridge *b)
 {
-    struct rlimit priority = {0}, locked = {0};
-    getrlimit(RLIMIT_RTPRIO, &priority);
-    getrlimit(RLIMIT_MEMLOCK, &locked);
-    main_list();
-    printf("limits: rtprio %llu%s, memlock %llu kB\n", (unsigned long long)priority.rlim_cur,
-           geteuid() == 0 ? " (root)" : "", (unsigned long long)locked.rlim_cur / 1024);
+    char id[256];
     pal_diagnostic diag = {""};
-    pal_err err = main_open_device(b, &diag);
-    pal_servo_options o = b->net_options.servo;
-    pal_dev_state state;
-    if (!err && o.backend->read(o.device, &state) < 0) err = pal_diagnostic_set(&diag, PAL_ERR_IO, "no first pose");
-    if (err) {
-        printf("device: %s\n", diag.text);
-        return 1;
-    }
-    printf("device: %s, peak %g N, continuous %g N, stiffness %g N/m; first pose %.1f %.1f %.1f mm\n", o.info.name,
-           o.info.peak_N, o.info.continuous_N, o.info.stiffness_max_N_m, state.position_m[0] * 1e3,
-           state.position_m[1] * 1e3, state.position_m[2] * 1e3);
-    o.pose_only = true;
-    o.rotation[0] = o.rotation[4] = o.rotation[8] = 1;
-    pal_servo_timing timing = {0};
-    err = pal_servo_create(&o, &b->servo);
-    if (!err) err = pal_servo_thread_start(b->servo, &o, &diag, &b->thread);
-    if (!err) sleep(1);
-    pal_servo_thread_stop(b->thread, &timing);
-    pal_servo_destroy(b->servo);
-    o.backend->close(o.device);
-    if (err) return 1;
-    printf("real time: %s%s, memory %s; %llu ticks, %llu missed, lateness p50 %.0f p99.9 %.0f max %.0f us\n",
-           timing.rt_flags & PAL_RT_FIFO ? "SCHED_FIFO" : "refused: ", timing.rt_flags & PAL_RT_FIFO ? "" : diag.text,
-           timing.rt_flags & PAL_RT_LOCKED ? "locked" : "not locked", (unsigned long long)timing.n_tick,
-           (unsigned long long)timing.n_missed, pal_jitter_at_us(&timing.lateness, 0.5),
-           pal_jitter_at_us(&timing.lateness, 0.999), (double)timing.lateness.max_ns * 1e-3);
-    return 0;
+    if (!main_find_device(b, id, sizeof id, &diag)) return pal_doctor(id, &b->net_options.servo, 1) > 0;
+    fprintf(stderr, "palpate-bridge: %s\n", diag.text);
+    return 1;
 }
 
 int main(int argc, char **argv)
@@ -297,7 +317,10 @@ int main(int argc, char **argv)
     pal_servo_options *servo = &net->servo;
     const pal_flag flag[] = {
         {"--device", "BACKEND:ID", PAL_FLAG_TEXT, &b.device, 0, 0,
-         "virtual:touch | premium | omega3 | inverse3 | falcon (virtual:touch)"},
+         "virtual:touch | premium | omega3 | inverse3 | falcon (virtual:touch)\n"
+         "hdapi:[NAME]  dhd:[NUMBER]  haply:[DEVICE][@HOST:PORT]  input:[FILE|spnav]  plugin:FILE[,ID]"},
+        {"--second-device", "BACKEND:ID", PAL_FLAG_TEXT, &b.second_device, 0, 0,
+         "for the other hand, with the next tool"},
         {"--server", "URL", PAL_FLAG_TEXT, &net->server, 0, 0, "ws://host:port/ws or lcm://group:port?ttl=0"},
         {"--session", "NAME", PAL_FLAG_TEXT, &net->session, 0, 0, "LCM: name in the channels (main)"},
         {"--name", "NAME", PAL_FLAG_TEXT, &net->name, 0, 0, "name among the members"},
@@ -322,7 +345,8 @@ int main(int argc, char **argv)
         {"--pose-only", NULL, PAL_FLAG_SWITCH, &servo->pose_only, 0, 0, "no force"},
         {"--stdin-stop", NULL, PAL_FLAG_SWITCH, &b.stdin_stop, 0, 0, "closed standard input is an emergency stop"},
         {"--list-devices", NULL, PAL_FLAG_SWITCH, &b.list, 0, 0, "which back ends there are, or why not"},
-        {"--doctor", NULL, PAL_FLAG_SWITCH, &b.doctor, 0, 0, "check limits, device and one second of servo"},
+        {"--doctor", NULL, PAL_FLAG_SWITCH, &b.doctor, 0, 0,
+         "measure limits, device and one second of servo; each line is ok or says what to do"},
     };
     const pal_flag_table table = {.program = "palpate-bridge",
                                   .usage = "[flags]",
@@ -331,7 +355,10 @@ int main(int argc, char **argv)
                                   PAL_FLAGS(flag)};
     const int code = pal_flags_parse(&table, argc, argv, &b.common, NULL, NULL);
     if (code >= 0) return code;
-    if (b.list) return main_list();
+    if (b.list) {
+        pal_doctor_list();
+        return 0;
+    }
     pal_diagnostic diag = {""};
     if (b.until_text &&
         pal_end_condition_parse(&b.until, until_name, sizeof until_name / sizeof *until_name, b.until_text, &diag))

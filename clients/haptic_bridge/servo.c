@@ -43,7 +43,7 @@ struct pal_servo {
     int n_gap;
     bool first, estop_latched, lost, stale, was_stale, at_wall;
     const pal_workspace_frame *next_frame; /* waits until it may be applied */
-    int degraded, bad_reads;
+    int degraded, bad_reads, read_error;
     pal_workspace place;
     double blend_s; /* of the newest model */
     double fade, fade_rate, clutch_fade, scale_down, mean_square;
@@ -261,7 +261,8 @@ static double servo_work(pal_servo *s, double dt)
 static bool servo_read(pal_servo *s, double dt)
 {
     pal_dev_state state;
-    if (s->o.backend->read(s->o.device, &state) < 0 || !pal_finite3(state.position_m)) return false;
+    s->read_error = s->o.backend->read(s->o.device, &state);
+    if (s->read_error < 0 || !pal_finite3(state.position_m)) return false;
     servo_move_frame(s);
     const bool button = (state.buttons & PAL_DEVICE_BUTTON_CLUTCH) != 0, was = s->place.clutched;
     const bool hold = button && (was || pal_norm3(s->force_prev) < CLUTCH_FORCE_N);
@@ -453,7 +454,9 @@ static void servo_contact(pal_servo *s, uint64_t now, double dt, pal_local_conta
 static void servo_rate(pal_servo *s, double dt)
 {
     const double rating = s->o.info.continuous_N;
-    s->mean_square += (1 - exp(-dt / RATING_TIME_S)) * (pal_dot3(s->force_prev, s->force_prev) - s->mean_square);
+    /* a device that spares its motors heats by what it gives */
+    const double *given = s->device.has_force ? s->device.force_N : s->force_prev;
+    s->mean_square += (1 - exp(-dt / RATING_TIME_S)) * (pal_dot3(given, given) - s->mean_square);
     const bool hot = s->mean_square > rating * rating;
     servo_toward(&s->scale_down, hot ? 0 : 1, hot ? dt / SCALE_DOWN_S : dt / SCALE_UP_S);
 }
@@ -562,7 +565,7 @@ static void servo_publish(pal_servo *s, uint64_t now)
     atomic_fetch_add(&s->ticks, 1);
 }
 
-/* one bad read keeps the force, more of them are a latched fault */
+/* one bad read keeps the force; after more of them the device is lost until it answers again */
 static void servo_unread(pal_servo *s, double force_d[3], double torque_d[3])
 {
     if (s->lost) return;
@@ -574,9 +577,12 @@ static void servo_unread(pal_servo *s, double force_d[3], double torque_d[3])
     s->lost = true;
     s->fade = 0;
     servo_release(s);
+    pal_workspace_restart(&s->place);
     s->view.state = PAL_SERVO_FAULT;
     s->view.n_fault++;
-    servo_event(s, PAL_EVENT_DEVICE_LOST, 0, 0, "device does not answer");
+    servo_event(s, PAL_EVENT_DEVICE_LOST, s->read_error, 0,
+                s->read_error < 0 ? s->o.backend->strerror(s->o.device, s->read_error)
+                                  : "position of the device is not a number");
 }
 
 void pal_servo_tick(pal_servo *s, uint64_t now_ns)
@@ -590,8 +596,15 @@ void pal_servo_tick(pal_servo *s, uint64_t now_ns)
     s->view.flags = 0;
     s->view.n_proxy = 0;
     s->view.depth_m = s->view.rendered_stiffness_N_m = 0;
-    const bool good = !s->lost && servo_read(s, dt);
+    const bool good = servo_read(s, dt);
     servo_take_model(s);
+    if (good && s->lost) {
+        s->lost = false;
+        servo_to_arming(s);
+        if (s->o.pose_only) s->view.state = PAL_SERVO_FREE;
+        if (s->estop_latched) s->view.state = PAL_SERVO_ESTOP;
+        servo_event(s, PAL_EVENT_RECOVERED, 0, 0, "device answers again");
+    }
     if (!good) {
         servo_unread(s, force_d, torque_d);
     } else {
@@ -612,6 +625,11 @@ void pal_servo_tick(pal_servo *s, uint64_t now_ns)
     pal_copy3(s->force_prev, force_d);
     pal_copy3(s->torque_prev, torque_d);
     servo_publish(s, now_ns);
+}
+
+bool pal_servo_device_lost(const pal_servo *servo)
+{
+    return servo->lost;
 }
 
 void pal_servo_end(pal_servo *servo)

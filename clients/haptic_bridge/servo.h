@@ -15,7 +15,7 @@
  *     fades out over 500 ms under 3 N s/m damping; FREE without a model (0.5 N s/m) follows. A new model fades in over
  *     250 ms or as the tank allows.
  *   - ESTOP and FAULT give no force until re-armed. E-stop is latched. A fault of speed, number or stalled loop re-arms
- *     by the conditions of ARMING; a device that does not answer does not re-arm.
+ *     by the conditions of ARMING, and so does a lost device when it answers again.
  *
  * Limits: |F| <= cap, rising by at most cap / 10 ms and falling without limit. An rms over 10 s above the device's
  * continuous rating scales force down. Stiffness of a contact or a grasp <= device limit / (scale force_scale), 300 N/m
@@ -66,7 +66,7 @@ typedef enum pal_servo_event_kind {
 typedef struct pal_servo_event {
     int16_t kind, code;
     float value;
-    const char *text; /* static string */
+    const char *text; /* static string; of a lost device its own, until it is lost again */
 } pal_servo_event;
 
 typedef struct pal_servo_options {
@@ -93,6 +93,8 @@ void pal_servo_destroy(pal_servo *servo); /* NULL is fine */
 void pal_servo_tick(pal_servo *servo, uint64_t now_ns);
 /* [servo] real-time class measured by the loop: 0 good, 1 stiffness limited, 2 forces off */
 void pal_servo_set_degraded(pal_servo *servo, int level);
+/* [servo] true: two reads in a row have failed, and none since has not */
+bool pal_servo_device_lost(const pal_servo *servo);
 /* [servo] sends zero force to the device, at the end */
 void pal_servo_end(pal_servo *servo);
 

@@ -1,4 +1,5 @@
 #include "clients/haptic_bridge/servo_thread.h"
+#include "clients/haptic_bridge/device_tuning.h"
 #include "server/base/triple_buffer.h"
 
 #include <pthread.h>
@@ -11,6 +12,7 @@
 
 #define WATCHDOG_NS      20000000u
 #define WATCHDOG_STEP_NS 5000000u
+#define ONE_SECOND_NS    1000000000u
 #define JUDGE_MIN_TICKS  2000
 #define LIMIT_LATE_US    2000.0
 #define OFF_LATE_US      10000.0
@@ -24,10 +26,10 @@ struct pal_servo_thread {
     const pal_clock *clock;
     pthread_t loop, watchdog;
     bool has_watchdog;
-    atomic_bool stop;
+    atomic_bool stop, idle; /* idle: no ticks are due, as the device is lost or has not begun to call */
     atomic_uint n_watchdog;
     atomic_int rt_flags;
-    uint64_t period_ns;
+    uint64_t period_ns, last_ns, judge_ns; /* last: 0 before the first tick */
     pal_triple_buffer timings;
     pal_servo_timing slot[3], total;
     /* lateness of each of the last seconds, for the judgement */
@@ -76,31 +78,83 @@ static bool thread_sleep_until(pal_servo_thread *t, uint64_t when_ns)
     return !atomic_load(&t->stop);
 }
 
+/* one tick at its time: what it took to come, and once a second the judgement */
+static void thread_tick(pal_servo_thread *t, uint64_t now, uint64_t late, uint64_t missed)
+{
+    pal_servo_tick(t->servo, now);
+    pal_jitter_add(&t->total.lateness, late);
+    pal_jitter_add(&t->second[t->now_second], late);
+    if (t->last_ns) pal_jitter_add(&t->total.period, now - t->last_ns);
+    t->last_ns = now;
+    t->total.n_tick++;
+    t->total.n_missed += missed;
+    t->second_missed[t->now_second] += missed;
+    if (now < t->judge_ns) return;
+    thread_judge(t);
+    t->judge_ns += ONE_SECOND_NS;
+}
+
+/* lost, and there is a way to get it back */
+static bool thread_is_lost(const pal_servo_thread *t)
+{
+    return pal_servo_device_lost(t->servo) && t->options.backend->reopen;
+}
+
+/* the servo of a polled device, until the end or until the device is lost */
+static void thread_poll(pal_servo_thread *t)
+{
+    uint64_t due = pal_clock_now_ns(t->clock) + t->period_ns, missed = 0;
+    while (thread_sleep_until(t, due)) {
+        const uint64_t now = pal_clock_now_ns(t->clock), late = now > due ? now - due : 0;
+        thread_tick(t, now, late, missed);
+        if (thread_is_lost(t)) return;
+        atomic_store(&t->idle, false);
+        due += t->period_ns;
+        /* missed ticks are left out, the grid of due times stays */
+        const uint64_t after = pal_clock_now_ns(t->clock), behind = after > due ? after - due : 0;
+        missed = behind ? behind / t->period_ns + (behind > t->period_ns / 2) : 0;
+        due += missed * t->period_ns;
+    }
+}
+
+/* a tick of a device that calls (device.h, run): late is what it comes after a period */
+static int thread_on_call(void *user)
+{
+    pal_servo_thread *t = user;
+    const uint64_t now = pal_clock_now_ns(t->clock);
+    if (atomic_exchange(&t->idle, false) && sched_getscheduler(0) == SCHED_FIFO)
+        atomic_fetch_or(&t->rt_flags, PAL_RT_FIFO);
+    const uint64_t due = t->last_ns ? t->last_ns + t->period_ns : now, late = now > due ? now - due : 0;
+    thread_tick(t, now, late, late / t->period_ns);
+    return atomic_load(&t->stop) || pal_servo_device_lost(t->servo);
+}
+
+/* the servo of a device that calls: a lost one fails to read, which the servo reports */
+static void thread_be_called(pal_servo_thread *t)
+{
+    const int error = t->options.backend->run(t->options.device, thread_on_call, t);
+    atomic_store(&t->idle, true);
+    for (int i = 0; i < 2 && error < 0 && !pal_servo_device_lost(t->servo); i++)
+        pal_servo_tick(t->servo, pal_clock_now_ns(t->clock));
+    /* a back end that returns at once does not keep the processor */
+    if (!thread_is_lost(t)) thread_sleep_until(t, pal_clock_now_ns(t->clock) + t->period_ns);
+}
+
 static void *thread_loop(void *user)
 {
     pal_servo_thread *t = user;
+    const pal_haptic_v1 *backend = t->options.backend;
     thread_touch_stack();
-    uint64_t due = pal_clock_now_ns(t->clock) + t->period_ns, last = 0, judge = due + 1000000000;
-    while (thread_sleep_until(t, due)) {
-        const uint64_t now = pal_clock_now_ns(t->clock), late = now > due ? now - due : 0;
-        pal_servo_tick(t->servo, now);
-        pal_jitter_add(&t->total.lateness, late);
-        pal_jitter_add(&t->second[t->now_second], late);
-        if (last) pal_jitter_add(&t->total.period, now - last);
-        last = now;
-        t->total.n_tick++;
-        due += t->period_ns;
-        /* missed ticks are left out, the grid of due times stays */
-        const uint64_t after = pal_clock_now_ns(t->clock);
-        if (after > due) {
-            const uint64_t missed = (after - due) / t->period_ns + (after - due > t->period_ns / 2);
-            t->total.n_missed += missed;
-            t->second_missed[t->now_second] += missed;
-            due += missed * t->period_ns;
-        }
-        if (after >= judge) {
-            thread_judge(t);
-            judge += 1000000000;
+    t->judge_ns = pal_clock_now_ns(t->clock) + t->period_ns + ONE_SECOND_NS;
+    while (!atomic_load(&t->stop)) {
+        t->last_ns = 0;
+        t->options.info.thread_model == PAL_DEVICE_POLLED ? thread_poll(t) : thread_be_called(t);
+        atomic_store(&t->idle, true);
+        while (thread_is_lost(t) &&
+               thread_sleep_until(t, pal_clock_now_ns(t->clock) + (uint64_t)(PAL_DEVICE_RETRY_S * ONE_SECOND_NS))) {
+            if (backend->reopen(t->options.device) < 0) continue;
+            backend->force_enable(t->options.device, !t->options.pose_only);
+            break;
         }
     }
     pal_servo_end(t->servo);
@@ -115,7 +169,7 @@ static void *thread_watch(void *user)
     while (thread_sleep_until(t, now + WATCHDOG_STEP_NS)) {
         const uint64_t ticks = pal_servo_ticks(t->servo);
         now = pal_clock_now_ns(t->clock);
-        if (ticks != seen) {
+        if (ticks != seen || atomic_load(&t->idle)) {
             seen = ticks, since = now;
             stopped = false;
         } else if (!stopped && now - since > WATCHDOG_NS) {
@@ -166,6 +220,7 @@ pal_err pal_servo_thread_start(pal_servo *servo, const pal_servo_options *option
     const bool locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
     options->backend->force_enable(options->device, !options->pose_only);
     atomic_store(&t->rt_flags, locked ? PAL_RT_LOCKED : 0);
+    atomic_store(&t->idle, options->info.thread_model != PAL_DEVICE_POLLED);
     pal_err err = thread_make(&t->loop, thread_loop, t, FIFO_SERVO, &fifo);
     if (!err && !options->no_watchdog) {
         err = thread_make(&t->watchdog, thread_watch, t, FIFO_WATCHDOG, &fifo_watch);
@@ -183,7 +238,8 @@ pal_err pal_servo_thread_start(pal_servo *servo, const pal_servo_options *option
     pal_diagnostic_set(diag, PAL_ERR_OK, "%s%s%s", fifo ? "" : "no SCHED_FIFO (needs CAP_SYS_NICE or an rtprio limit) ",
                        locked ? "" : "memory not locked (needs a memlock limit) ",
                        fifo && !pinned ? "not pinned to a processor" : "");
-    if (fifo) atomic_fetch_or(&t->rt_flags, PAL_RT_FIFO);
+    /* the thread of a library is the library's */
+    if (fifo && options->info.thread_model != PAL_DEVICE_CALLBACK) atomic_fetch_or(&t->rt_flags, PAL_RT_FIFO);
     *out = t;
     return PAL_ERR_OK;
 }

@@ -5,7 +5,11 @@
  * and is skipped, never caught up. Where the system allows it: SCHED_FIFO 80 (watchdog 81), locked memory, a prefaulted
  * stack, the last processor; what it refuses is reported. Every second the lateness of the last 10 s is checked: p99.9
  * above 2 ms limits stiffness; above 10 ms, or more than 1 % missed ticks, forces are off. The watchdog stops the
- * device after 20 ms without a tick. */
+ * device after 20 ms without a tick.
+ *
+ * A device that calls (device.h, run) ticks on the thread of its library or in the loop, at its own pace: a tick is
+ * late by what it comes after one period. A lost device is opened again every 2 s, where its back end can; until then
+ * there are no ticks, and the watchdog rests. */
 #ifndef PAL_HAPTIC_BRIDGE_SERVO_THREAD_H
 #define PAL_HAPTIC_BRIDGE_SERVO_THREAD_H
 #include "clients/haptic_bridge/jitter.h"

@@ -64,7 +64,7 @@ echo "     grasp held: felt $felt N of $given N, largest step $(json max_step_N 
 timeout 20 "$bin/palpate-bridge" --server ws://127.0.0.1:9/ws --seconds 1 --json >"$work/nobody" 2>"$work/nobody.err"
 check "nobody at the address is a failure" $? == 1
 check "said in one line" "$(wc -l <"$work/nobody.err")" == 1
-timeout 20 "$bin/palpate-bridge" --device hdapi:x >/dev/null 2>&1
+timeout 20 "$bin/palpate-bridge" --device nothing:x >/dev/null 2>&1
 check "an unknown back end is refused" $? == 1
 check "the list of devices names the virtual ones" "$("$bin/palpate-bridge" --list-devices | grep -c omega3)" == 1
 check "the doctor runs the servo for a second" "$(timeout 20 "$bin/palpate-bridge" --doctor | grep -c 'lateness p50')" == 1

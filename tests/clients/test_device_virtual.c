@@ -227,7 +227,7 @@ static void refuses_unknown_devices_hands_and_keys(void)
     CHECK(pal_device_virtual()->open(&d, "touch,force=9", &info) < 0);
     CHECK(pal_device_virtual()->open(&d, "touch,depth=x", &info) < 0);
     CHECK(pal_device_find("virtual", 7) == pal_device_virtual());
-    CHECK(pal_device_find("hdapi", 5) == NULL);
+    CHECK(pal_device_find("nothing", 7) == NULL);
 }
 
 int main(void)
