@@ -7,6 +7,7 @@
 #ifndef PAL_SIM_CONTACT_GRASP_H
 #define PAL_SIM_CONTACT_GRASP_H
 #include "server/sim/contact/haptic_stiffness.h"
+#include "server/sim/contact/tissue_compliance.h"
 #include "server/sim/core/effect.h"
 #include "server/sim/surface/adaptive_grasp.h"
 
@@ -28,7 +29,6 @@ typedef struct pal_grasp_implicit {
     double k_N_m, pull[3]; /* at the sub-step's begin: stiffness, force of the spring on tissue */
     double load[3];        /* force on tissue in body->load                                    */
     double stretch_m;      /* at the end of the last sub-step                                  */
-    pal_grasp_compliance compliance;
 } pal_grasp_implicit;
 
 /* the grasp of one tool */
@@ -45,6 +45,7 @@ typedef struct pal_grasp {
     double force[3];              /* on the tool, this sub-step                           */
     pal_adaptive_grasp *adaptive; /* adaptive bodies only, else NULL                      */
     pal_stiffness_fit fit;        /* rendered stiffness                                   */
+    pal_grasp_compliance compliance;
     pal_grasp_implicit *implicit; /* implicit solvers only, else NULL                     */
     pal_grasp_transfer *transfer; /* heap, after a transfer; else NULL                    */
 } pal_grasp;
@@ -60,6 +61,7 @@ struct pal_grasps {
     double asked_N_m, damping_s, asked_reach_m; /* keys */
     double young_Pa, poisson;
     uint64_t revision; /* adaptive bodies: of the nodes that are held */
+    pal_tissue_compliance *tissue; /* explicit solvers only, else NULL */
 };
 
 void pal_grasp_act_explicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *tool, pal_step *step);

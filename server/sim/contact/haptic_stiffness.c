@@ -130,35 +130,71 @@ void pal_haptic_stiffness_contact(pal_haptic_stiffness *known, pal_contact_group
 
 /* ---- a weighted mean of nodes ---- */
 
-/* how the mean moves for each newton along `direction` that is shared out by weight; node NULL: all nodes in order */
-static bool solve_mean(const pal_body *body, const int32_t *node, const double *weight, int n,
-                       const double direction[3], double mean_m_N[3], pal_arena *scratch)
+/* how the mean moves for each newton along `direction` that is shared out by weight; node NULL: all nodes in order.
+ * answer [n_node][3]: how all move */
+static bool solve_mean(const pal_body *body, const pal_compliance *compliance, const int32_t *node,
+                       const double *weight, int n, const double direction[3], double mean_m_N[3], double *answer,
+                       pal_arena *scratch)
 {
     size_t used = pal_arena_used(scratch), n3 = 3 * (size_t)body->n_node;
-    double *load, *move;
-    bool known = PAL_NEW_DOUBLES(scratch, n3, &load, &move) && body->compliance;
+    double *load = PAL_NEW(scratch, double, n3);
+    bool known = load && answer && compliance;
     for (int i = 0; i < n && known; i++) pal_axpy3(load + 3 * (size_t)(node ? node[i] : i), weight[i], direction);
-    known = known && body->compliance->solve(body->compliance->self, body, load, move);
+    known = known && compliance->solve(compliance->self, body, load, answer);
     pal_set3(mean_m_N, 0, 0, 0);
-    for (int i = 0; i < n && known; i++) pal_axpy3(mean_m_N, weight[i], move + 3 * (size_t)(node ? node[i] : i));
+    for (int i = 0; i < n && known; i++) pal_axpy3(mean_m_N, weight[i], answer + 3 * (size_t)(node ? node[i] : i));
     pal_arena_rewind(scratch, used);
     return known;
 }
 
-void pal_haptic_stiffness_near(pal_haptic_stiffness *known, pal_contact_group *group, const double at_m[3],
-                               const pal_contact_points *points, const pal_body *body, const int32_t *point,
-                               const double *weight, int n, double k_N_m, pal_arena *scratch)
+/* to [n_node] += weight shared out over the nodes that bear a point */
+static void add_point(const pal_contact_points *points, const pal_body *body, int point, double weight, double *to)
+{
+    pal_contact_slot part[PAL_CONTACT_POINT_SLOTS];
+    int m = pal_contact_points_slots(points, body, point, part);
+    for (int k = 0; k < m; k++) to[pal_contact_points_slot_node(body, part[k].slot)] += weight * part[k].weight;
+}
+
+void pal_haptic_stiffness_pressed(pal_haptic_stiffness *known, pal_contact_group *group, const double at_m[3],
+                                  const pal_contact_points *points, const pal_body *body,
+                                  const pal_compliance *compliance, const pal_contact *contact, int n, double radius_m,
+                                  pal_arena *scratch)
 {
     size_t used = pal_arena_used(scratch);
-    double *sum = PAL_NEW(scratch, double, body->n_node), inward[3], mean[3], give = 0;
-    pal_contact_slot part[PAL_CONTACT_POINT_SLOTS];
-    for (int i = 0; i < n && sum; i++) {
-        int m = pal_contact_points_slots(points, body, point[i], part);
-        for (int k = 0; k < m; k++) sum[pal_contact_points_slot_node(body, part[k].slot)] += weight[i] * part[k].weight;
+    double *sum = PAL_NEW(scratch, double, body->n_node), *answer = PAL_NEW(scratch, double, 3 * (size_t)body->n_node);
+    double inward[3], mean[3], total = 0, give = 0, k = 0, lost = 0;
+    pal_scale3(inward, -1, group->normal);
+    for (int pass = 0; pass < 2 && sum; pass++)
+        for (int i = 0; i < n; i++) {
+            const double force = fmax(0, pal_dot3(contact[i].force, inward));
+            if (force == 0 || !pal_contact_group_has(inward, contact[i].away)) continue;
+            if (pass == 0) total += force;
+            /* the contacts' own give, force over depth being their stiffness */
+            if (pass == 1) give += force * contact[i].depth_m / (total * total);
+            if (pass == 1) add_point(points, body, contact[i].point, force / total, sum);
+        }
+    if (total > 0 && solve_mean(body, compliance, NULL, sum, body->n_node, inward, mean, answer, scratch)) {
+        k = 1 / (give + fmax(0, pal_dot3(mean, inward)));
+        for (int i = 0; i < 3 * body->n_node; i++) answer[i] *= k;
+        for (int i = 0; i < n; i++)
+            if (pal_dot3(contact[i].force, inward) > 0 && pal_contact_group_has(inward, contact[i].away))
+                lost += turned_N_m(points, body, &contact[i], radius_m, group->normal, answer);
+        keep(known, group, at_m, fmax(STIFFNESS_N_M.low, k - lost));
     }
+    pal_arena_rewind(scratch, used);
+}
+
+void pal_haptic_stiffness_near(pal_haptic_stiffness *known, pal_contact_group *group, const double at_m[3],
+                               const pal_contact_points *points, const pal_body *body, const pal_compliance *compliance,
+                               const int32_t *point, const double *weight, int n, double k_N_m, pal_arena *scratch)
+{
+    size_t used = pal_arena_used(scratch);
+    double *sum = PAL_NEW(scratch, double, body->n_node), *answer = PAL_NEW(scratch, double, 3 * (size_t)body->n_node);
+    double inward[3], mean[3], give = 0;
+    for (int i = 0; i < n && sum; i++) add_point(points, body, point[i], weight[i], sum);
     /* as contact presses: the solver starts from the answer to a load that is alike */
     pal_scale3(inward, -1, group->normal);
-    if (sum && k_N_m > 0 && solve_mean(body, NULL, sum, body->n_node, inward, mean, scratch))
+    if (sum && k_N_m > 0 && solve_mean(body, compliance, NULL, sum, body->n_node, inward, mean, answer, scratch))
         give = 1 / k_N_m + pal_dot3(mean, inward);
     pal_arena_rewind(scratch, used);
     keep(known, group, at_m, give > 0 && isfinite(give) ? 1 / give : 0);
@@ -166,14 +202,19 @@ void pal_haptic_stiffness_near(pal_haptic_stiffness *known, pal_contact_group *g
 
 /* ---- grasp ---- */
 
-void pal_grasp_compliance_update(pal_grasp_compliance *w, const pal_body *body, const int32_t *node,
-                                 const double *weight, int n, const double at_m[3], double min_m, pal_arena *scratch)
+void pal_grasp_compliance_update(pal_grasp_compliance *w, const pal_body *body, const pal_compliance *compliance,
+                                 const int32_t *node, const double *weight, int n, const double at_m[3], double min_m,
+                                 pal_arena *scratch)
 {
     double unit[3] = {0}, mean[3];
     int axis = w->next;
-    if (!body->compliance || (w->n_known == 3 && axis == 0 && pal_dist3(w->at_m, at_m) < min_m)) return;
+    if (!compliance || (w->n_known == 3 && axis == 0 && pal_dist3(w->at_m, at_m) < min_m)) return;
     unit[axis] = 1;
-    if (!solve_mean(body, node, weight, n, unit, mean, scratch)) return;
+    size_t used = pal_arena_used(scratch);
+    double *answer = PAL_NEW(scratch, double, 3 * (size_t)body->n_node);
+    bool known = solve_mean(body, compliance, node, weight, n, unit, mean, answer, scratch);
+    pal_arena_rewind(scratch, used);
+    if (!known) return;
     pal_copy3(w->column_m_N[axis], mean);
     if (axis == 0) pal_copy3(w->at_m, at_m);
     if (w->n_known == axis) w->n_known++;
@@ -211,5 +252,5 @@ double pal_grasp_compliance_along(const pal_grasp_compliance *w, double k_N_m, d
 
 size_t pal_haptic_stiffness_scratch(const pal_body *body)
 {
-    return 9 * sizeof(double) * (size_t)body->n_node + 3 * sizeof(double) * PAL_CONTACT_IMPLICIT_MAX + 1024;
+    return 10 * sizeof(double) * (size_t)body->n_node + 3 * sizeof(double) * PAL_CONTACT_IMPLICIT_MAX + 1024;
 }

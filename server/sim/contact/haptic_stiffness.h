@@ -50,10 +50,15 @@ void pal_haptic_stiffness_contact(pal_haptic_stiffness *known, pal_contact_group
                                   pal_contact_springs *springs, int first, const pal_contact_points *points,
                                   const pal_body *body, const pal_contact *contact, int n, double radius_m,
                                   pal_arena *scratch);
+/* the same from the contacts' forces, whose distribution stays what it is: for explicit solvers */
+void pal_haptic_stiffness_pressed(pal_haptic_stiffness *known, pal_contact_group *group, const double at_m[3],
+                                  const pal_contact_points *points, const pal_body *body,
+                                  const pal_compliance *compliance, const pal_contact *contact, int n, double radius_m,
+                                  pal_arena *scratch);
 /* finds that of a group without contact: points near, weights (sum 1), contact stiffness k_N_m of them all */
 void pal_haptic_stiffness_near(pal_haptic_stiffness *known, pal_contact_group *group, const double at_m[3],
-                               const pal_contact_points *points, const pal_body *body, const int32_t *point,
-                               const double *weight, int n, double k_N_m, pal_arena *scratch);
+                               const pal_contact_points *points, const pal_body *body, const pal_compliance *compliance,
+                               const int32_t *point, const double *weight, int n, double k_N_m, pal_arena *scratch);
 
 /* W_g: columns are found one at a time; those not known yet are taken isotropic */
 typedef struct pal_grasp_compliance {
@@ -63,8 +68,8 @@ typedef struct pal_grasp_compliance {
 } pal_grasp_compliance;
 
 /* the next column, unless all are known and the tool has moved by less than min_m; weight [n] has the sum 1 */
-void pal_grasp_compliance_update(pal_grasp_compliance *w, const pal_body *body, const int32_t *node,
-                                 const double *weight, int n, const double at_m[3], double min_m, pal_arena *scratch);
+void pal_grasp_compliance_update(pal_grasp_compliance *w, const pal_body *body, const pal_compliance *compliance,
+                                 const int32_t *node, const double *weight, int n, const double at_m[3], double min_m, pal_arena *scratch);
 /* K of tissue in series with a spring k, as xx xy xz yy yz zz; false: W_g is not known, or is no compliance */
 bool pal_grasp_compliance_series(const pal_grasp_compliance *w, double k_N_m, double K[6]);
 /* rise of the force for each metre that the spring's end leads the tissue; k_guess_N_m until all of W_g is known */

@@ -37,6 +37,7 @@ struct pal_push {
     pal_material material;        /* the body's, Poisson's ratio at most PAL_POISSON_CLAMP                */
     float *point_Pa;              /* pal_contact_points_young                                             */
     pal_contact_springs *springs; /* implicit only                                                        */
+    pal_tissue_compliance *tissue; /* explicit only                                                       */
     int n_stiffness, n_step;      /* stiffnesses found in this step; steps, to give each tool its turn    */
 };
 
@@ -53,6 +54,8 @@ void pal_push_follow_side(pal_tool_contact *t, const double side_before[3], doub
 
 /* interpolated: the stiffness that the points near a tool will want, as pal_effect.bounds.wanted */
 void pal_push_want(pal_push *push, const pal_body *body, double *bound_N_m);
+/* explicit: memory beside */
+pal_err pal_push_make_explicit(pal_push *push, pal_build *build);
 /* implicit: memory beside; pal_tangent.settle, self a pal_push */
 pal_err pal_push_make_implicit(pal_push *push, pal_build *build);
 bool pal_push_settle(void *self, pal_step *step, const double *moved, bool last);

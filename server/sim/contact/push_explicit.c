@@ -110,12 +110,28 @@ static void press(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step 
     pal_push_follow_side(t, t->proxy.normal, step->dt_s);
 }
 
+pal_err pal_push_make_explicit(pal_push *push, pal_build *build)
+{
+    push->tissue = PAL_NEW(build->arena, pal_tissue_compliance, 1);
+    if (!push->tissue) return PAL_ERR_MEMORY;
+    size_t scratch = pal_haptic_stiffness_scratch(build->body) +
+                     (size_t)push->points.sample.max_point * 4 * sizeof(double) + CONTACT_MAX + 256;
+    if (build->scratch_byte < scratch) build->scratch_byte = scratch;
+    return pal_tissue_compliance_make(build->body, build->arena, push->tissue);
+}
+
 static void act(pal_push *push, int n_tool, pal_step *step)
 {
     for (int t = 0; t < n_tool; t++) find_share(push, &push->tool[t], n_tool, step);
     for (int t = 0; t < n_tool; t++) press(push, &push->tool[t], &step->tools->tool[t], step);
-    for (int t = 0; t < n_tool && step->sub == step->n_sub - 1; t++)
+    if (step->sub != step->n_sub - 1) return;
+    /* each tool in turn is the first to have its patches' stiffness found */
+    push->n_step++, push->n_stiffness = 0;
+    pal_tissue_compliance_begin(push->tissue, step);
+    for (int k = 0; k < n_tool; k++) {
+        const int t = (k + push->n_step) % n_tool;
         pal_push_publish(push, &push->tool[t], &step->tools->tool[t], step);
+    }
 }
 
 const pal_push_regime pal_push_explicit = {.pressure_Pa_m = pal_push_pressure_of_radius,

@@ -41,7 +41,7 @@ static void find_back(const pal_push *push, pal_tool_contact *t, const pal_tool 
 {
     pal_tool_contact_implicit *implicit = t->implicit;
     const pal_contact_implicit *solve = &implicit->solve;
-    double k = pal_haptic_stiffness_max(&implicit->stiffness, pal_push_punch_N_m(push, tool->radius_m));
+    double k = pal_haptic_stiffness_max(&t->stiffness, pal_push_punch_N_m(push, tool->radius_m));
     implicit->back_m = implicit->old_back_m;
     if (solve->capped || implicit->back_m > 0)
         implicit->back_m =

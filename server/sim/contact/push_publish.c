@@ -46,6 +46,11 @@ void pal_push_follow_side(pal_tool_contact *t, const double side_before[3], doub
 
 /* ---- patches ---- */
 
+static const pal_compliance *compliance(const pal_push *push, const pal_body *body)
+{
+    return push->tissue ? &push->tissue->hook : body->compliance;
+}
+
 /* stiffness of a group without contact: of what the sphere would lie on, were it NEAREST_RADII nearer */
 static void find_near(pal_push *push, pal_tool_contact *t, const double here[3], pal_step *step, const double *x,
                       pal_contact_group *group)
@@ -66,24 +71,27 @@ static void find_near(pal_push *push, pal_tool_contact *t, const double here[3],
             sum += weight[n++] = area;
         }
     for (int i = 0; i < n; i++) weight[i] /= sum;
-    pal_haptic_stiffness_near(&t->implicit->stiffness, group, here, &push->points, step->body, point, weight, n, k,
-                              step->scratch);
+    pal_haptic_stiffness_near(&t->stiffness, group, here, &push->points, step->body, compliance(push, step->body), point,
+                              weight, n, k, step->scratch);
 }
 
 /* k1 of a group from the solver's compliance, found again when it has changed, within the step's budget */
 static void find_stiffness(pal_push *push, pal_tool_contact *t, const pal_tool *tool, pal_step *step, const double *x,
                            pal_contact_group *group)
 {
-    pal_tool_contact_implicit *implicit = t->implicit;
+    const pal_tool_contact_implicit *implicit = t->implicit;
     double here[3], radius = tool->radius_m;
     pal_sub3(here, tool->here_m, step->body->offset_m);
-    implicit->stiffness.time_s = step->time_s;
-    if (!pal_haptic_stiffness_find(&implicit->stiffness, group, here, SHALLOW_RADII * radius)) return;
-    if (push->n_stiffness >= STIFFNESS_BUDGET || (group->force_N > 0 && implicit->solve.constant)) return;
+    t->stiffness.time_s = step->time_s;
+    if (!pal_haptic_stiffness_find(&t->stiffness, group, here, SHALLOW_RADII * radius)) return;
+    if (push->n_stiffness >= STIFFNESS_BUDGET || (group->force_N > 0 && implicit && implicit->solve.constant)) return;
     push->n_stiffness++;
-    if (group->force_N > 0)
-        pal_haptic_stiffness_contact(&implicit->stiffness, group, here, push->springs, implicit->solve.first,
-                                     &push->points, step->body, t->contact, t->n_contact, radius, step->scratch);
+    if (group->force_N > 0 && implicit)
+        pal_haptic_stiffness_contact(&t->stiffness, group, here, push->springs, implicit->solve.first, &push->points,
+                                     step->body, t->contact, t->n_contact, radius, step->scratch);
+    else if (group->force_N > 0)
+        pal_haptic_stiffness_pressed(&t->stiffness, group, here, &push->points, step->body,
+                                     compliance(push, step->body), t->contact, t->n_contact, radius, step->scratch);
     else
         find_near(push, t, here, step, x, group);
 }
@@ -107,7 +115,7 @@ void pal_push_publish(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_s
         while (n < PAL_CONTACT_PATCH_MAX && pal_contact_group_near(t->proxy.x, radius, pal_push_near_m(push, radius), x,
                                                                    t->n_list, group, n, &group[n]))
             n++;
-        for (int b = 0; b < n && step->body->compliance && t->hold.share == 0; b++)
+        for (int b = 0; b < n && compliance(push, step->body) && t->hold.share == 0; b++)
             find_stiffness(push, t, tool, step, x, &group[b]);
     }
     pal_arena_rewind(step->scratch, used);

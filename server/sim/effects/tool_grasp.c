@@ -48,6 +48,7 @@ static void reset(void *self, const pal_body *body)
     for (int t = 0; t < grasps->n_tool; t++)
         grasps->grasp[t].closed = grasps->grasp[t].button = false, grasps->grasp[t].n_node = 0;
     memset(grasps->sum_weight, 0, sizeof(double) * (size_t)body->n_node);
+    if (grasps->tissue) pal_tissue_compliance_reset(grasps->tissue);
 }
 
 static pal_err make_grasp(pal_grasp *g, const pal_body *body, pal_arena *arena)
@@ -74,10 +75,13 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
     if (build->body->display.n_shown == 0)
         return PAL_REFUSE(build->diag, "%s: tool_grasp needs a body with a shown surface", entry->path);
     size_t n_node = (size_t)build->body->n_node, scratch = 6 * sizeof(double) * n_node + 256;
-    if (build->body->implicit) {
+    if (build->scratch_byte < scratch) build->scratch_byte = scratch;
+    if (build->body->implicit)
         build->body->wants_compliance = true;
-        if (build->scratch_byte < scratch) build->scratch_byte = scratch;
-    }
+    else if (!(grasps->tissue = PAL_NEW(build->arena, pal_tissue_compliance, 1)))
+        return PAL_ERR_MEMORY;
+    else
+        PAL_TRY(pal_tissue_compliance_make(build->body, build->arena, grasps->tissue));
     grasps->act = build->body->implicit ? pal_grasp_act_implicit : pal_grasp_act_explicit;
     grasps->n_tool = build->scene->n_tool;
     grasps->grasp = PAL_NEW(build->arena, pal_grasp, grasps->n_tool);
@@ -167,6 +171,7 @@ static void close_grasp(pal_grasps *grasps, pal_grasp *g, const pal_tool *tool, 
            tissue = 2 * grasps->young_Pa * reach / (1 - grasps->poisson * grasps->poisson);
     pal_stiffness_fit_start(&g->fit, fmax(STIFFNESS_N_M.low, k * tissue / (k + tissue)));
     pal_stiffness_fit_add(&g->fit, tool->last.position_m, (double[3]){0}, tool->radius_m);
+    g->compliance = (pal_grasp_compliance){.n_known = 0};
     if (g->implicit) *g->implicit = (pal_grasp_implicit){.pulls = false};
 }
 
@@ -286,6 +291,7 @@ static pal_err run(void *self, pal_step *step)
     pal_tools *tools = step->tools;
     int n_tool = tools->n_tool < grasps->n_tool ? tools->n_tool : grasps->n_tool;
     if (step->sub == 0) update_nodes(grasps, step->body);
+    if (grasps->tissue && step->sub == step->n_sub - 1) pal_tissue_compliance_begin(grasps->tissue, step);
     for (int t = 0; t < n_tool; t++) {
         pal_grasp *g = &grasps->grasp[t];
         if (step->sub == 0) begin_tool(grasps, g, &tools->tool[t], step->body);

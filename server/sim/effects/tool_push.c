@@ -34,8 +34,10 @@ static void reset(void *self, const pal_body *body)
     (void)body;
     push->points.sub_step += 2; /* the body jumped: velocities start again */
     push->n_step = 0;
+    if (push->tissue) pal_tissue_compliance_reset(push->tissue);
     for (int t = 0; t < push->n_tool; t++) {
         push->tool[t].active = false;
+        push->tool[t].stiffness = (pal_haptic_stiffness){.next = 0};
         push->tool[t].share = 1;
         pal_tool_contact_end_blend(&push->tool[t]);
         if (push->tool[t].implicit) *push->tool[t].implicit = (pal_tool_contact_implicit){.solve.across = -1};
@@ -90,7 +92,7 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
                    : build->body->active        ? &pal_push_held_load
                    : build->body->interpolation ? &pal_push_interpolated
                                                 : &pal_push_explicit;
-    if (build->body->implicit) PAL_TRY(pal_push_make_implicit(push, build));
+    PAL_TRY(build->body->implicit ? pal_push_make_implicit(push, build) : pal_push_make_explicit(push, build));
     reset(push, build->body);
     *self = push;
     return PAL_ERR_OK;
