@@ -13,17 +13,17 @@ bool pal_contact_group_next(const pal_contact *contact, int n, uint8_t *grouped,
 {
     double axis[3], sum[3];
     int seed = -1;
-    double max2 = 0;
+    double max = 0;
     for (int i = 0; i < n; i++) {
-        double f2 = pal_dot3(contact[i].force, contact[i].force);
-        if (!grouped[i] && f2 > max2) max2 = f2, seed = i;
+        if (!grouped[i] && contact[i].normal_N > max) max = contact[i].normal_N, seed = i;
     }
     if (seed < 0) return false;
     pal_copy3(axis, contact[seed].away);
     for (int pass = 0; pass < 2; pass++) {
         pal_set3(sum, 0, 0, 0);
         for (int i = 0; i < n; i++)
-            if (!grouped[i] && pal_contact_group_has(axis, contact[i].away)) pal_add3(sum, sum, contact[i].force);
+            if (!grouped[i] && pal_contact_group_has(axis, contact[i].away)) 
+                pal_axpy3(sum, contact[i].normal_N, contact[i].away);
         if (pass == 0 && !pal_unit3(axis, sum, 0)) break;
     }
     for (int i = 0; i < n; i++)

@@ -7,7 +7,7 @@
 
 typedef struct pal_contact_group {
     double normal[3]; /* from tissue to tool, unit                                         */
-    double force_N;   /* normal force, 0 when only near                                    */
+    double force_N;   /* without friction, 0 when only near                                  */
     double gap_m;     /* distance the tool has to go until it touches, >= 0; 0 in contact  */
     double k_N_m;     /* tangent stiffness by the solver's compliance; 0: not known        */
 } pal_contact_group;

@@ -190,6 +190,7 @@ static void sum_forces(pal_contact_implicit *solve, const double *force_N)
     for (int i = 0; i < n; i++) {
         double push_N = fmax(0, force_N[i]);
         pal_axpy3(solve->total_N, -force_N[i], contact[i].away);
+        contact[i].normal_N = push_N;
         pal_scale3(contact[i].force, push_N, contact[i].away);
         if (sum > 0) pal_axpy3(contact[i].force, push_N / sum, across);
     }

@@ -101,7 +101,7 @@ static double turned_N_m(const pal_contact_points *points, const pal_body *body,
     for (int k = 0; k < n; k++)
         pal_axpy3(r, part[k].weight, answer + 3 * (size_t)pal_contact_points_slot_node(body, part[k].slot));
     pal_axpy3(r, -pal_dot3(r, contact->away), contact->away);
-    return pal_norm3(contact->force) * pal_dot3(r, normal) / (radius_m - contact->depth_m);
+    return contact->normal_N * pal_dot3(r, normal) / (radius_m - contact->depth_m);
 }
 
 void pal_haptic_stiffness_contact(pal_haptic_stiffness *known, pal_contact_group *group, const double at_m[3],
@@ -117,7 +117,7 @@ void pal_haptic_stiffness_contact(pal_haptic_stiffness *known, pal_contact_group
     pal_scale3(inward, -1, group->normal);
     for (int i = 0; i < n; i++) {
         if (!pal_contact_group_has(inward, contact[i].away)) continue;
-        if (pal_dot3(contact[i].force, contact[i].force) == 0 || springs->k_N_m[first + i] <= 0) continue;
+        if (contact[i].normal_N == 0 || springs->k_N_m[first + i] <= 0) continue;
         share[m] = pal_dot3(contact[i].away, inward);
         row[m++] = first + i;
     }
@@ -166,7 +166,7 @@ void pal_haptic_stiffness_pressed(pal_haptic_stiffness *known, pal_contact_group
     pal_scale3(inward, -1, group->normal);
     for (int pass = 0; pass < 2 && sum; pass++)
         for (int i = 0; i < n; i++) {
-            const double force = fmax(0, pal_dot3(contact[i].force, inward));
+            const double force = contact[i].normal_N * pal_dot3(contact[i].away, inward);
             if (force == 0 || !pal_contact_group_has(inward, contact[i].away)) continue;
             if (pass == 0) total += force;
             /* the contacts' own give, force over depth being their stiffness */
@@ -177,7 +177,7 @@ void pal_haptic_stiffness_pressed(pal_haptic_stiffness *known, pal_contact_group
         k = 1 / (give + fmax(0, pal_dot3(mean, inward)));
         for (int i = 0; i < 3 * body->n_node; i++) answer[i] *= k;
         for (int i = 0; i < n; i++)
-            if (pal_dot3(contact[i].force, inward) > 0 && pal_contact_group_has(inward, contact[i].away))
+            if (contact[i].normal_N > 0 && pal_contact_group_has(inward, contact[i].away))
                 lost += turned_N_m(points, body, &contact[i], radius_m, group->normal, answer);
         keep(known, group, at_m, fmax(STIFFNESS_N_M.low, k - lost));
     }

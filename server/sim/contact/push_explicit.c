@@ -56,6 +56,12 @@ static void find_share(pal_push *push, pal_tool_contact *t, int n_tool, pal_step
     t->share = share < t->share ? share : fmin(share, t->share * (1 + step->dt_s / PAL_BLEND_S));
 }
 
+static void scale_contact(pal_contact *contact, double share)
+{
+    contact->normal_N *= share;
+    pal_scale3(contact->force, share, contact->force);
+}
+
 /* after other triangles were drawn the force begins at that of before; returns the part of it */
 static double limit_rise(pal_tool_contact *t, double sum[3])
 {
@@ -65,7 +71,7 @@ static double limit_rise(pal_tool_contact *t, double sum[3])
     if (part == 1) return 1;
     t->ramp *= part;
     pal_scale3(sum, part, sum);
-    for (int i = 0; i < t->n_contact; i++) pal_scale3(t->contact[i].force, part, t->contact[i].force);
+    for (int i = 0; i < t->n_contact; i++) scale_contact(&t->contact[i], part);
     return part;
 }
 
@@ -84,7 +90,8 @@ static void press(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step 
         pal_contact *c = &t->contact[i];
         double v[3], k = scale * c->k_N_m;
         pal_contact_points_at(&push->points, c->point, push->points.v, v);
-        pal_scale3(c->force, fmax(0, k * (c->depth_m - damping_s * pal_dot3(v, c->away))), c->away);
+        c->normal_N = fmax(0, k * (c->depth_m - damping_s * pal_dot3(v, c->away)));
+        pal_scale3(c->force, c->normal_N, c->away);
         pal_add3(sum, sum, c->force);
         stiffness += k;
     }
@@ -103,7 +110,7 @@ static void press(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step 
         pal_axpy3(body->load + at, share, push->points.force + at);
     }
     pal_scale3(t->total, share, sum);
-    for (int i = 0; i < t->n_contact; i++) pal_scale3(t->contact[i].force, share, t->contact[i].force);
+    for (int i = 0; i < t->n_contact; i++) scale_contact(&t->contact[i], share);
     pal_add3(tool->force_N, tool->force_N, t->total);
     pal_add3(t->total, t->total, t->hold.now_N);
     tool->touching = true;

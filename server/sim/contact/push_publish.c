@@ -120,7 +120,8 @@ void pal_push_publish(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_s
     }
     pal_arena_rewind(step->scratch, used);
     double k = pal_haptic_stiffness_clamp(pal_push_punch_N_m(push, radius));
-    pal_contact_patch_options options = {.radius_m = radius,
+    pal_contact_patch_options options = {.step_s = step->dt_s * step->n_sub,
+                                         .radius_m = radius,
                                          .k_start_N_m = k,
                                          .b_s = step->body->damping_1_s * 4.0 / 3 * M_PI *
                                                 push->material.density_kg_m3 * radius * radius * radius / k,

@@ -28,14 +28,19 @@ static bool begin(model_scene *m, model_kind kind, double mu, double at[3])
     model_scene_make(m, kind);
     m->scene->tool[0].force_cap_N = 15;
     pal_tools_default(m->scene, 1);
-    m->scene->tool[0].radius_m = 0.008;
+    const bool box = kind == SPRINGS || kind == FEM;
+    if (box) {
+        box_free(&m->mesh);
+        if (box_make(8, 8, 4, 0.01, &m->mesh)) abort();
+        if (kind == FEM) { pal_hexes_free(&m->mesh.hexes); if (pal_hexes_find(&m->mesh.tets, &m->mesh.hexes, &m->diag)) abort(); }
+    }
+    m->scene->tool[0].radius_m = 0.012;
     pal_config_entry *push = model_scene_effect(m, "tool_push");
     model_scene_effect(m, "tool_grasp");
     model_scene_effect(m, "finite_guard");
     if (mu > 0) pal_entry_put_number(push, "friction", mu, NULL);
     if (!model_scene_open(m)) return false;
-    const bool box = kind == SPRINGS || kind == FEM;
-    at[0] = box ? 0.033 : 0.004, at[1] = box ? 0.027 : 0.003, at[2] = box ? 0.075 : 0.055;
+    at[0] = box ? 0.037 : 0.004, at[1] = box ? 0.042 : 0.003, at[2] = box ? 0.055 : 0.055;
     pose(m, at, false);
     double to[3];
     pal_copy3(to, at);
@@ -156,8 +161,8 @@ static void drag(void)
         go(&m, at, to, 0.02, 100, false);
         const pal_tool *t = tool_of(&m);
         printf("%s kt %.4g k1 %.4g mu %.3g %.3g\n", model_kind_name[kind], t->patch[0].kt_N_m, t->patch[0].k1_N_m, t->patch[0].mu_static, t->patch[0].mu_dynamic);
-        for (int i = 0; i < 30; i++) {
-            to[0] += 0.0005;
+        for (int i = 0; i < 12; i++) {
+            to[0] += 0.001;
             go(&m, at, to, 0.02, 20, false);
             t = tool_of(&m);
             const double *n = t->patch[0].normal, *f = t->mean_force_N;
