@@ -105,10 +105,10 @@ static double turned_N_m(const pal_contact_points *points, const pal_body *body,
 }
 
 void pal_haptic_stiffness_contact(pal_haptic_stiffness *known, pal_contact_group *group, const double at_m[3],
-                                  pal_contact_springs *springs, int first, const pal_contact_points *points,
-                                  const pal_body *body, const pal_contact *contact, int n, double radius_m,
-                                  pal_arena *scratch)
+                                  const pal_compliance *compliance, pal_contact_springs *springs, int first,
+                                  const pal_contact *contact, int n, double radius_m, pal_arena *scratch)
 {
+    const pal_body *body = springs->body;
     size_t used = pal_arena_used(scratch);
     double *answer = PAL_NEW(scratch, double, 3 * (size_t)body->n_node), lost = 0;
     int32_t row[PAL_CONTACT_IMPLICIT_MAX];
@@ -121,11 +121,11 @@ void pal_haptic_stiffness_contact(pal_haptic_stiffness *known, pal_contact_group
         share[m] = pal_dot3(contact[i].away, inward);
         row[m++] = first + i;
     }
-    double k = pal_contact_springs_stiffness(springs, row, share, m, STIFFNESS_PASSES, answer, scratch);
+    double k = pal_contact_springs_stiffness(springs, compliance, row, share, m, STIFFNESS_PASSES, answer, scratch);
     for (int i = 0; i < m && answer && k > 0; i++)
-        lost += turned_N_m(points, body, &contact[row[i] - first], radius_m, group->normal, answer);
+        lost += turned_N_m(springs->points, body, &contact[row[i] - first], radius_m, group->normal, answer);
     pal_arena_rewind(scratch, used);
-    keep(known, group, at_m, k > 0 ? fmax(STIFFNESS_N_M.low, k - lost) : 0);
+    if (k > 0) keep(known, group, at_m, fmax(STIFFNESS_N_M.low, k - lost));
 }
 
 /* ---- a weighted mean of nodes ---- */
@@ -155,35 +155,6 @@ static void add_point(const pal_contact_points *points, const pal_body *body, in
     for (int k = 0; k < m; k++) to[pal_contact_points_slot_node(body, part[k].slot)] += weight * part[k].weight;
 }
 
-void pal_haptic_stiffness_pressed(pal_haptic_stiffness *known, pal_contact_group *group, const double at_m[3],
-                                  const pal_contact_points *points, const pal_body *body,
-                                  const pal_compliance *compliance, const pal_contact *contact, int n, double radius_m,
-                                  pal_arena *scratch)
-{
-    size_t used = pal_arena_used(scratch);
-    double *sum = PAL_NEW(scratch, double, body->n_node), *answer = PAL_NEW(scratch, double, 3 * (size_t)body->n_node);
-    double inward[3], mean[3], total = 0, give = 0, k = 0, lost = 0;
-    pal_scale3(inward, -1, group->normal);
-    for (int pass = 0; pass < 2 && sum; pass++)
-        for (int i = 0; i < n; i++) {
-            const double force = contact[i].normal_N * pal_dot3(contact[i].away, inward);
-            if (force == 0 || !pal_contact_group_has(inward, contact[i].away)) continue;
-            if (pass == 0) total += force;
-            /* the contacts' own give, force over depth being their stiffness */
-            if (pass == 1) give += force * contact[i].depth_m / (total * total);
-            if (pass == 1) add_point(points, body, contact[i].point, force / total, sum);
-        }
-    if (total > 0 && solve_mean(body, compliance, NULL, sum, body->n_node, inward, mean, answer, scratch)) {
-        k = 1 / (give + fmax(0, pal_dot3(mean, inward)));
-        for (int i = 0; i < 3 * body->n_node; i++) answer[i] *= k;
-        for (int i = 0; i < n; i++)
-            if (contact[i].normal_N > 0 && pal_contact_group_has(inward, contact[i].away))
-                lost += turned_N_m(points, body, &contact[i], radius_m, group->normal, answer);
-        keep(known, group, at_m, fmax(STIFFNESS_N_M.low, k - lost));
-    }
-    pal_arena_rewind(scratch, used);
-}
-
 void pal_haptic_stiffness_near(pal_haptic_stiffness *known, pal_contact_group *group, const double at_m[3],
                                const pal_contact_points *points, const pal_body *body, const pal_compliance *compliance,
                                const int32_t *point, const double *weight, int n, double k_N_m, pal_arena *scratch)
@@ -191,13 +162,14 @@ void pal_haptic_stiffness_near(pal_haptic_stiffness *known, pal_contact_group *g
     size_t used = pal_arena_used(scratch);
     double *sum = PAL_NEW(scratch, double, body->n_node), *answer = PAL_NEW(scratch, double, 3 * (size_t)body->n_node);
     double inward[3], mean[3], give = 0;
+    bool found = sum && k_N_m > 0;
     for (int i = 0; i < n && sum; i++) add_point(points, body, point[i], weight[i], sum);
     /* as contact presses: the solver starts from the answer to a load that is alike */
     pal_scale3(inward, -1, group->normal);
-    if (sum && k_N_m > 0 && solve_mean(body, compliance, NULL, sum, body->n_node, inward, mean, answer, scratch))
-        give = 1 / k_N_m + pal_dot3(mean, inward);
+    found = found && solve_mean(body, compliance, NULL, sum, body->n_node, inward, mean, answer, scratch);
+    if (found) give = 1 / k_N_m + pal_dot3(mean, inward);
     pal_arena_rewind(scratch, used);
-    keep(known, group, at_m, give > 0 && isfinite(give) ? 1 / give : 0);
+    if (found) keep(known, group, at_m, give > 0 && isfinite(give) ? 1 / give : 0);
 }
 
 /* ---- grasp ---- */

@@ -47,14 +47,8 @@ double pal_haptic_stiffness_max(const pal_haptic_stiffness *known, double k_N_m)
  * is what springs do not show: with r the tool's motion relative to tissue across `away`, a contact of force f turns
  * and loses f r / distance of its part along the normal */
 void pal_haptic_stiffness_contact(pal_haptic_stiffness *known, pal_contact_group *group, const double at_m[3],
-                                  pal_contact_springs *springs, int first, const pal_contact_points *points,
-                                  const pal_body *body, const pal_contact *contact, int n, double radius_m,
-                                  pal_arena *scratch);
-/* the same from the contacts' forces, whose distribution stays what it is: for explicit solvers */
-void pal_haptic_stiffness_pressed(pal_haptic_stiffness *known, pal_contact_group *group, const double at_m[3],
-                                  const pal_contact_points *points, const pal_body *body,
-                                  const pal_compliance *compliance, const pal_contact *contact, int n, double radius_m,
-                                  pal_arena *scratch);
+                                  const pal_compliance *compliance, pal_contact_springs *springs, int first,
+                                  const pal_contact *contact, int n, double radius_m, pal_arena *scratch);
 /* finds that of a group without contact: points near, weights (sum 1), contact stiffness k_N_m of them all */
 void pal_haptic_stiffness_near(pal_haptic_stiffness *known, pal_contact_group *group, const double at_m[3],
                                const pal_contact_points *points, const pal_body *body, const pal_compliance *compliance,

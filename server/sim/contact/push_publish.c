@@ -75,6 +75,29 @@ static void find_near(pal_push *push, pal_tool_contact *t, const double here[3],
                               weight, n, k, step->scratch);
 }
 
+/* stiffness of an explicit contact: the springs that press, as stiff as their forces are, or each second, third ... */
+static void find_pressed(pal_push *push, pal_tool_contact *t, const double here[3], pal_step *step,
+                         pal_contact_group *group)
+{
+    size_t used = pal_arena_used(step->scratch);
+    pal_contact *contact = PAL_NEW(step->scratch, pal_contact, PAL_CONTACT_IMPLICIT_MAX);
+    int n_press = 0, n = 0, seen = 0;
+    for (int i = 0; i < t->n_contact; i++) n_press += t->contact[i].normal_N > 0;
+    const int stride = 1 + n_press / (PAL_CONTACT_IMPLICIT_MAX + 1);
+    pal_contact_springs_begin(push->springs);
+    for (int i = 0; i < t->n_contact && contact; i++) {
+        if (!(t->contact[i].normal_N > 0) || seen++ % stride != 0) continue;
+        contact[n] = t->contact[i];
+        contact[n].normal_N *= stride;
+        contact[n].k_N_m = contact[n].normal_N / contact[n].depth_m;
+        if (pal_contact_springs_add(push->springs, contact[n].point, contact[n].away, contact[n].k_N_m) < 0) break;
+        n++;
+    }
+    pal_haptic_stiffness_contact(&t->stiffness, group, here, compliance(push, step->body), push->springs, 0, contact, n,
+                                 t->limits.radius_m, step->scratch);
+    pal_arena_rewind(step->scratch, used);
+}
+
 /* k1 of a group from the solver's compliance, found again when it has changed, within the step's budget */
 static void find_stiffness(pal_push *push, pal_tool_contact *t, const pal_tool *tool, pal_step *step, const double *x,
                            pal_contact_group *group)
@@ -87,11 +110,10 @@ static void find_stiffness(pal_push *push, pal_tool_contact *t, const pal_tool *
     if (push->n_stiffness >= STIFFNESS_BUDGET || (group->force_N > 0 && implicit && implicit->solve.constant)) return;
     push->n_stiffness++;
     if (group->force_N > 0 && implicit)
-        pal_haptic_stiffness_contact(&t->stiffness, group, here, push->springs, implicit->solve.first, &push->points,
-                                     step->body, t->contact, t->n_contact, radius, step->scratch);
+        pal_haptic_stiffness_contact(&t->stiffness, group, here, step->body->compliance, push->springs,
+                                     implicit->solve.first, t->contact, t->n_contact, radius, step->scratch);
     else if (group->force_N > 0)
-        pal_haptic_stiffness_pressed(&t->stiffness, group, here, &push->points, step->body,
-                                     compliance(push, step->body), t->contact, t->n_contact, radius, step->scratch);
+        find_pressed(push, t, here, step, group);
     else
         find_near(push, t, here, step, x, group);
 }

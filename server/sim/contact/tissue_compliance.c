@@ -146,7 +146,7 @@ static bool continue_answer(pal_tissue_compliance *tissue, pal_tissue_answer **o
         good = iterate(tissue, a);
     const double left2 = dot(body, a->left, a->left);
     if (!isfinite(left2)) a->size2 = 0;
-    return left2 <= KNOWN_SHARE * KNOWN_SHARE * size2;
+    return left2 <= ANSWER_SHARE * ANSWER_SHARE * size2;
 }
 
 static bool solve(void *self, const pal_body *body, const double *force_N, double *move_m)

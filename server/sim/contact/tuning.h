@@ -73,9 +73,8 @@ enum { STIFFNESS_PASSES = 2 };
 #define ITERATIONS_1_S 240
 /* edges of an element. Displacement of a difference of forces: far above rounding, far below a change of stiffness */
 #define DIFFERENCE_EDGES 1e-5
-/* residual over load at which an answer is good enough to stop, and to be used at all */
-#define ANSWER_SHARE 1e-2
-#define KNOWN_SHARE 0.1
+/* residual over load of an answer */
+#define ANSWER_SHARE 0.02
 
 /* ---- rendered stiffness (test_contact_implicit, test_tool_push, test_tool_grasp) ---- */
 

@@ -1,182 +1,216 @@
-/* exploration */
+/* What a haptic bridge is told, against the server's own force, for every model: springs and adaptive surfaces and
+ * subdivision solids by explicit solvers, finite elements by an implicit one. Finite differences are over poses that
+ * the tissue was left to settle at. */
 #include "server/base/vec3.h"
 #include "tests/fixtures/model_scenes.h"
 
-static void pose(model_scene *m, const double x[3], bool grasp)
-{
-    pal_pose p = {.quat = {1, 0, 0, 0}, .buttons = grasp};
-    pal_copy3(p.position_m, x);
-    REQUIRE(!pal_world_pose(m->world, 0, &p));
-}
-static const pal_tool *tool_of(const model_scene *m) { return &pal_world_tools(m->world)->tool[0]; }
+static const double depth_m = 0.002, speed_m_s = 0.02, friction = 0.4;
+enum { SETTLE = 150 }; /* steps: 2.5 s, after which forces differ by less than 1e-4 */
 
-static void go(model_scene *m, double at[3], const double to[3], double speed, int settle, bool grasp)
+static const pal_tool *tool_of(const model_scene *m)
 {
-    double step = speed * m->scene->step_s, far = pal_dist3(at, to);
-    int n = (int)ceil(far / step);
+    return &pal_world_tools(m->world)->tool[0];
+}
+
+static bool hold(model_scene *m, const double at[3], bool grasp)
+{
+    pal_pose pose = {.quat = {1, 0, 0, 0}, .buttons = grasp};
+    pal_copy3(pose.position_m, at);
+    return !pal_world_pose(m->world, 0, &pose) && model_scene_steps(m, 1);
+}
+
+/* from `at` to `to` in a straight line, then `settle` steps; at = to */
+static bool go(model_scene *m, double at[3], const double to[3], int settle, bool grasp)
+{
+    const int n = (int)ceil(pal_dist3(at, to) / (speed_m_s * m->scene->step_s));
     double from[3];
     pal_copy3(from, at);
     for (int i = 1; i <= n; i++) {
         for (int c = 0; c < 3; c++) at[c] = from[c] + (to[c] - from[c]) * i / n;
-        pose(m, at, grasp);
-        REQUIRE(model_scene_steps(m, 1));
+        if (!hold(m, at, grasp)) return false;
     }
-    REQUIRE(model_scene_steps(m, settle));
+    return model_scene_steps(m, settle);
 }
+
+/* a tool of 12 mm that just touches the top of a body of some 8 cm */
 static bool begin(model_scene *m, model_kind kind, double mu, double at[3])
 {
-    model_scene_make(m, kind);
-    m->scene->tool[0].force_cap_N = 15;
-    pal_tools_default(m->scene, 1);
     const bool box = kind == SPRINGS || kind == FEM;
+    model_scene_make(m, kind);
     if (box) {
+        if (kind == FEM) pal_hexes_free(&m->mesh.hexes);
         box_free(&m->mesh);
-        if (box_make(8, 8, 4, 0.01, &m->mesh)) abort();
-        if (kind == FEM) { pal_hexes_free(&m->mesh.hexes); if (pal_hexes_find(&m->mesh.tets, &m->mesh.hexes, &m->diag)) abort(); }
+        if (box_make(8, 8, 4, 0.01, &m->mesh)) return false;
+        if (kind == FEM && pal_hexes_find(&m->mesh.tets, &m->mesh.hexes, &m->diag)) return false;
     }
+    pal_tools_default(m->scene, 1);
     m->scene->tool[0].radius_m = 0.012;
-    pal_config_entry *push = model_scene_effect(m, "tool_push");
+    m->scene->tool[0].force_cap_N = 15;
+    if (mu > 0)
+        pal_entry_put_number(model_scene_effect(m, "tool_push"), "friction", mu, NULL);
+    else
+        model_scene_effect(m, "tool_push");
     model_scene_effect(m, "tool_grasp");
-    model_scene_effect(m, "finite_guard");
-    if (mu > 0) pal_entry_put_number(push, "friction", mu, NULL);
     if (!model_scene_open(m)) return false;
-    at[0] = box ? 0.037 : 0.004, at[1] = box ? 0.042 : 0.003, at[2] = box ? 0.055 : 0.055;
-    pose(m, at, false);
-    double to[3];
-    pal_copy3(to, at);
-    while (!tool_of(m)->touching) { to[2] = at[2] - 0.0001; go(m, at, to, 0.03, 0, false); }
-    go(m, at, to, 0.02, 60, false);
+    const double start[3] = {box ? 0.037 : 0.004, box ? 0.042 : 0.003, 0.055};
+    pal_copy3(at, start);
+    while (!tool_of(m)->touching) {
+        at[2] -= 0.0001;
+        if (at[2] < 0 || !hold(m, at, false)) return false;
+    }
     return true;
 }
 
-static void rest(model_scene *m, double at[3], double tremor, int n, double *dk, double *dp, double *kmean, double *kmin, double *kmax, double *fdiff, double *npatch)
+/* what changes from model to model in n steps about `at`, the hand trembling by tremor_m: parts of k1, m of the plane
+ * along its normal, and the part by which F is not k1 d at the pose */
+typedef struct jitter {
+    double k, plane_m, force;
+} jitter;
+static jitter watch(model_scene *m, const double at[3], double tremor_m, int n)
 {
     pal_contact_patch last = {0};
-    double k0 = 0;
-    *dk = *dp = *kmean = *fdiff = 0; *kmin = INFINITY; *kmax = 0; *npatch = 0;
+    jitter worst = {0};
     for (int i = 0; i < n; i++) {
-        double x[3];
+        double x[3], move[3], t = i * m->scene->step_s;
         pal_copy3(x, at);
-        double t = i * m->scene->step_s;
-        x[2] += tremor * sin(2 * M_PI * 8 * t), x[0] += tremor * sin(2 * M_PI * 7 * t);
-        pose(m, x, false);
-        REQUIRE(model_scene_steps(m, 1));
-        const pal_tool *tool = tool_of(m);
-        *npatch = fmax(*npatch, tool->n_patch);
-        const pal_contact_patch *p = &tool->patch[0];
-        double d = pal_dot3(p->normal, (double[3]){p->point_m[0]-tool->here_m[0],p->point_m[1]-tool->here_m[1],p->point_m[2]-tool->here_m[2]});
-        *fdiff = fmax(*fdiff, fabs(p->k1_N_m * d / pal_norm3(tool->force_N) - 1));
-        if (i) {
-            double move[3];
-            pal_sub3(move, p->point_m, last.point_m);
-            *dk = fmax(*dk, fabs(p->k1_N_m / last.k1_N_m - 1));
-            *dp = fmax(*dp, fabs(pal_dot3(move, p->normal)));
+        x[0] += tremor_m * sin(2 * M_PI * 7 * t), x[2] += tremor_m * sin(2 * M_PI * 8 * t);
+        if (!hold(m, x, false) || tool_of(m)->n_patch == 0) return (jitter){INFINITY, INFINITY, INFINITY};
+        const pal_contact_patch *now = &tool_of(m)->patch[0];
+        pal_sub3(move, now->point_m, tool_of(m)->here_m);
+        worst.force = fmax(worst.force, fabs(now->k1_N_m * pal_dot3(move, now->normal) /
+                                             pal_norm3(tool_of(m)->force_N) - 1));
+        pal_sub3(move, now->point_m, last.point_m);
+        if (i > 0) worst.k = fmax(worst.k, fabs(now->k1_N_m / last.k1_N_m - 1));
+        if (i > 0) worst.plane_m = fmax(worst.plane_m, fabs(pal_dot3(move, now->normal)));
+        last = *now;
+    }
+    return worst;
+}
+
+/* settled force on the tool at at + move */
+static bool force_at(model_scene *m, double at[3], double x, double y, double z, bool grasp, double force[3])
+{
+    const double base[3] = {at[0], at[1], at[2]}, to[3] = {at[0] + x, at[1] + y, at[2] + z};
+    if (!go(m, at, to, SETTLE, grasp)) return false;
+    pal_copy3(force, tool_of(m)->mean_force_N);
+    return go(m, at, base, SETTLE, grasp);
+}
+
+/* k1 against the slope of the normal force between half a millimetre less and more, at three depths */
+static void a_resting_hand_has_a_steady_model_of_the_right_stiffness(void)
+{
+    for (model_kind kind = 0; kind < MODEL_KINDS; kind++) {
+        model_scene m;
+        double at[3];
+        REQUIRE(begin(&m, kind, 0, at));
+        for (int k = 1; k <= 3; k++) {
+            const double to[3] = {at[0], at[1], at[2] - depth_m}, half_m = 0.0005;
+            double less[3], more[3];
+            REQUIRE(go(&m, at, to, SETTLE, false));
+            const jitter still = watch(&m, at, 0, 60), trembling = watch(&m, at, 5e-5, 120);
+            REQUIRE(go(&m, at, to, SETTLE, false));
+            const pal_contact_patch patch = tool_of(&m)->patch[0];
+            REQUIRE(force_at(&m, at, 0, 0, half_m, false, less) && force_at(&m, at, 0, 0, -half_m, false, more));
+            /* along z the plane is as far away as 1 / n_z, and its force has n_z of itself */
+            const double slope = (more[2] - less[2]) / (2 * half_m),
+                         told = patch.k1_N_m * patch.normal[2] * patch.normal[2];
+            printf("  %-16s %d mm: k1 %.4g, slope %.4g N/m (%+.1f %%); still %.2g %%, %.2g mm; trembling %.2g %%, "
+                   "%.2g mm; F/k1d - 1 %.2g\n",
+                   model_kind_name[kind], 2 * k, told, slope, 100 * (told / slope - 1), 100 * still.k,
+                   1e3 * still.plane_m, 100 * trembling.k, 1e3 * trembling.plane_m, still.force);
+            CHECK_LE(still.k, 0.05);
+            CHECK_LE(still.plane_m, 1e-4);
+            CHECK_LE(trembling.k, 0.05);
+            CHECK_LE(trembling.plane_m, 1e-4);
+            CHECK_LE(still.force, 1e-6);
+            CHECK_NEAR(told, slope, 0.12 * slope);
         }
-        last = *p, k0 = p->k1_N_m;
-        *kmean += k0 / n; *kmin = fmin(*kmin, k0), *kmax = fmax(*kmax, k0);
+        model_scene_close(&m);
     }
 }
 
-static void press(void)
+/* all of K against forces a millimetre to each side */
+static void a_grasp_has_the_tangent_stiffness_of_tissue(void)
 {
-    for (int kind = 0; kind < MODEL_KINDS; kind++) {
+    for (model_kind kind = 0; kind < MODEL_KINDS; kind++) {
+        static const int place[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
         model_scene m;
-        double at[3], top;
-        REQUIRE(begin(&m, kind, 0, at));
-        printf("%s substeps %d compliance %d implicit %d S %.3g\n", model_kind_name[kind], pal_world_substeps(m.world), m.body->compliance != NULL, m.body->implicit, m.body->length_scale_m);
-        top = at[2];
-        for (int k = 1; k <= 3; k++) {
-            double to[3] = {at[0], at[1], top - 0.002 * k}, dk, dp, km, k0, k1, fd, np;
-            go(&m, at, to, 0.02, 0, false);
-            rest(&m, at, 0, 60, &dk, &dp, &km, &k0, &k1, &fd, &np);
-            printf("  %d mm arriving: dk %.3g dp %.3g mm k %.4g..%.4g F/kd-1 %.2g patches %g\n", 2*k, dk, 1e3*dp, k0, k1, fd, np);
-            go(&m, at, to, 0.02, 120, false);
-            rest(&m, at, 0, 60, &dk, &dp, &km, &k0, &k1, &fd, &np);
-            double F = pal_norm3(tool_of(&m)->mean_force_N), kk = km;
-            printf("  rest: F %.4g dk %.3g dp %.3g mm k %.4g..%.4g F/kd-1 %.2g\n", F, dk, 1e3*dp, k0, k1, fd);
-            rest(&m, at, 0.00005, 120, &dk, &dp, &km, &k0, &k1, &fd, &np);
-            printf("  tremor: dk %.3g dp %.3g mm k %.4g..%.4g F/kd-1 %.2g\n", dk, 1e3*dp, k0, k1, fd);
-            double d = 0.0005, n[3];
-            double hi[3] = {at[0], at[1], at[2] + d}, lo[3] = {at[0], at[1], at[2] - d}, mid[3];
-            pal_copy3(mid, at);
-            pal_copy3(n, tool_of(&m)->patch[0].normal);
-            go(&m, at, hi, 0.02, 150, false);
-            double fh = tool_of(&m)->mean_force_N[2];
-            go(&m, at, lo, 0.02, 150, false);
-            double fl = tool_of(&m)->mean_force_N[2];
-            go(&m, at, mid, 0.02, 150, false);
-            double f0 = tool_of(&m)->mean_force_N[2];
-            printf("  slope %.4g (%.4g %.4g)  k1 %.4g n_z %.4g  k1 nz^2 %.4g\n", (fl - fh) / (2 * d), (f0 - fh)/d, (fl-f0)/d, kk, n[2], kk * n[2] * n[2]);
-        }
-        model_scene_close(&m);
-    }
-}
-static void grip(void)
-{
-    for (int kind = 0; kind < MODEL_KINDS; kind++) {
-        model_scene m;
-        double at[3];
+        double at[3], worst = 0, side_m = 0.001;
         REQUIRE(begin(&m, kind, 0, at));
         double to[3] = {at[0], at[1], at[2] + 0.001};
-        go(&m, at, to, 0.02, 60, false);
-        go(&m, at, to, 0.02, 10, false);
-        pose(&m, at, true);
-        REQUIRE(model_scene_steps(&m, 10));
-        to[2] += 0.005;
-        go(&m, at, to, 0.02, 150, true);
-        const pal_tool *t = tool_of(&m);
-        CHECK(t->has_grasp);
-        double K[6], f0[3];
-        memcpy(K, t->grasp_k_N_m, sizeof K);
-        pal_copy3(f0, t->mean_force_N);
-        printf("%s f0 %.4g %.4g %.4g K %.4g %.4g %.4g %.4g %.4g %.4g b %.3g\n", model_kind_name[kind], f0[0], f0[1], f0[2], K[0],K[1],K[2],K[3],K[4],K[5], t->grasp_b_Ns_m);
-        double base[3], S[3][3];
-        pal_copy3(base, at);
+        REQUIRE(go(&m, at, to, 30, false) && hold(&m, at, true));
+        to[2] += 0.004, to[0] += 0.002;
+        REQUIRE(go(&m, at, to, SETTLE, true));
+        const pal_tool *tool = tool_of(&m);
+        double K[6];
+        REQUIRE(tool->has_grasp);
+        memcpy(K, tool->grasp_k_N_m, sizeof K);
+        CHECK_LE(pal_dist3(tool->grasp_x0_m, at), 1e-12);
+        CHECK_LE(pal_dist3(tool->grasp_f0_N, tool->mean_force_N), 1e-3 * pal_norm3(tool->mean_force_N));
+        const double largest = fmax(K[0], fmax(K[3], K[5]));
         for (int c = 0; c < 3; c++) {
-            double f[2][3];
-            for (int s = 0; s < 2; s++) {
-                double p[3];
-                pal_copy3(p, base);
-                p[c] += s ? 0.001 : -0.001;
-                go(&m, at, p, 0.02, 150, true);
-                pal_copy3(f[s], tool_of(&m)->mean_force_N);
-            }
-            for (int i = 0; i < 3; i++) S[i][c] = -(f[1][i] - f[0][i]) / 0.002;
+            double less[3], more[3];
+            REQUIRE(force_at(&m, at, -side_m * (c == 0), -side_m * (c == 1), -side_m * (c == 2), true, less));
+            REQUIRE(force_at(&m, at, side_m * (c == 0), side_m * (c == 1), side_m * (c == 2), true, more));
+            for (int i = 0; i < 3; i++)
+                worst = fmax(worst, fabs(K[place[i][c]] + (more[i] - less[i]) / (2 * side_m)));
         }
-        printf("  FD %.4g %.4g %.4g / %.4g %.4g %.4g / %.4g %.4g %.4g\n", S[0][0],S[0][1],S[0][2],S[1][0],S[1][1],S[1][2],S[2][0],S[2][1],S[2][2]);
-        go(&m, at, base, 0.02, 150, true);
-        t = tool_of(&m);
-        memcpy(K, t->grasp_k_N_m, sizeof K);
-        printf("  after: K %.4g %.4g %.4g %.4g %.4g %.4g\n", K[0],K[1],K[2],K[3],K[4],K[5]);
+        const double minor = K[0] * K[3] - K[1] * K[1],
+                     det = K[0] * (K[3] * K[5] - K[4] * K[4]) - K[1] * (K[1] * K[5] - K[4] * K[2]) +
+                           K[2] * (K[1] * K[4] - K[3] * K[2]);
+        printf("  %-16s %.3g N, K %.4g %.4g %.4g / %.4g %.4g / %.4g, worst %.2g of the largest\n",
+               model_kind_name[kind], pal_norm3(tool->mean_force_N), K[0], K[1], K[2], K[3], K[4], K[5],
+               worst / largest);
+        CHECK(K[0] > 0 && minor > 0 && det > 0);
+        CHECK_LE(worst, 0.05 * largest);
+        CHECK(tool->grasp_b_Ns_m >= 0);
         model_scene_close(&m);
     }
 }
-static void drag(void)
+
+/* parts of the tool's force along and across the normal of its first patch */
+static void split(const model_scene *m, double *normal_N, double across[3])
 {
-    for (int kind = 0; kind < MODEL_KINDS; kind++) {
+    const pal_contact_patch *patch = &tool_of(m)->patch[0];
+    *normal_N = pal_dot3(tool_of(m)->mean_force_N, patch->normal);
+    pal_copy3(across, tool_of(m)->mean_force_N);
+    pal_axpy3(across, -*normal_N, patch->normal);
+}
+
+/* the stroke is 10 mm at 20 mm/s; sticking is measured 0.2 mm to each side, far from slipping */
+static void friction_is_what_the_patch_says(void)
+{
+    for (model_kind kind = 0; kind < MODEL_KINDS; kind++) {
         model_scene m;
-        double at[3];
-        REQUIRE(begin(&m, kind, 0.4, at));
-        double to[3] = {at[0] , at[1], at[2] - 0.003};
-        go(&m, at, to, 0.02, 100, false);
-        const pal_tool *t = tool_of(&m);
-        printf("%s kt %.4g k1 %.4g mu %.3g %.3g\n", model_kind_name[kind], t->patch[0].kt_N_m, t->patch[0].k1_N_m, t->patch[0].mu_static, t->patch[0].mu_dynamic);
-        for (int i = 0; i < 12; i++) {
-            to[0] += 0.001;
-            go(&m, at, to, 0.02, 20, false);
-            t = tool_of(&m);
-            const double *n = t->patch[0].normal, *f = t->mean_force_N;
-            double N = pal_dot3(f, n), T[3];
-            pal_copy3(T, f); pal_axpy3(T, -N, n);
-            printf("   %.3g mm: N %.4g T %.4g T/N %.3g fx %.4g k1 %.4g kt %.4g n %.3g %.3g %.3g np %d\n", 0.5*(i+1), N, pal_norm3(T), pal_norm3(T)/N, f[0], t->patch[0].k1_N_m, t->patch[0].kt_N_m, n[0], n[1], n[2], t->n_patch);
+        double at[3], less[3], more[3], worst = 0, mean = 0, normal, across[3], side_m = 0.0002;
+        REQUIRE(begin(&m, kind, friction, at));
+        double to[3] = {at[0], at[1], at[2] - 0.003};
+        REQUIRE(go(&m, at, to, SETTLE, false));
+        const pal_contact_patch patch = tool_of(&m)->patch[0];
+        REQUIRE(force_at(&m, at, -side_m, 0, 0, false, less) && force_at(&m, at, side_m, 0, 0, false, more));
+        const double slope = -(more[0] - less[0]) / (2 * side_m);
+        int n = 0;
+        for (int i = 1; i <= 30; i++) {
+            to[0] = at[0] + speed_m_s * m.scene->step_s;
+            REQUIRE(go(&m, at, to, 0, false));
+            split(&m, &normal, across);
+            if (i <= 20) continue;
+            worst = fmax(worst, fabs(pal_norm3(across) / (friction * normal) - 1));
+            mean += (pal_norm3(across) / (friction * normal) - 1), n++;
         }
+        printf("  %-16s kt %.4g, slope %.4g N/m; sliding %+.2g %% of mu N, worst %.2g %%, %.3g N\n",
+               model_kind_name[kind], patch.kt_N_m, slope, 100 * mean / n, 100 * worst, normal);
+        CHECK(patch.mu_static == friction && patch.mu_dynamic == friction);
+        CHECK_LE(fabs(mean / n), 0.02);
+        CHECK_NEAR(patch.kt_N_m, slope, 0.25 * slope);
         model_scene_close(&m);
     }
 }
-int main(int argc, char **argv)
+
+int main(void)
 {
-    if (argc < 2 || argv[1][0] == 'p') press();
-    if (argc < 2 || argv[1][0] == 'g') grip();
-    if (argc < 2 || argv[1][0] == 'd') drag();
-    return 0;
+    RUN_LONG(a_resting_hand_has_a_steady_model_of_the_right_stiffness);
+    RUN_LONG(a_grasp_has_the_tangent_stiffness_of_tissue);
+    RUN_LONG(friction_is_what_the_patch_says);
+    return check_report();
 }
