@@ -68,11 +68,12 @@ static pal_contact_patch patch_of(const pal_contact_patch_track *track, const pa
                                   const pal_contact_group *group, const pal_tool *tool)
 {
     double k = track->k_N_m, height = group->force_N > 0 ? group->force_N / k : -group->gap_m;
+    const double sideways = group->sideways > 0 ? group->sideways : options->sideways;
     pal_contact_patch patch = {.k1_N_m = k,
                                .id = track->id,
                                .group = track->id,
                                .b_Ns_m = options->b_s * k,
-                               .kt_N_m = options->friction > 0 ? options->sideways * k : 0,
+                               .kt_N_m = options->friction > 0 ? sideways * k : 0,
                                .mu_static = options->friction,
                                .mu_dynamic = options->friction,
                                .radius_m = options->radius_m};

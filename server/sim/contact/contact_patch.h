@@ -13,7 +13,7 @@ typedef struct pal_contact_patch_options {
     double k_start_N_m; /* k1 before the first contact: that of a flat punch, 2 E a / (1 - nu^2)       */
     double b_s;         /* damping over stiffness, s                                                    */
     double friction;    /* coefficient, static and dynamic alike                                        */
-    double sideways;    /* tangential over normal stiffness, of a flat punch: 2 (1 - nu) / (2 - nu)     */
+    double sideways;    /* tangential over normal stiffness until it is known: of a flat punch, 2 (1 - nu) / (2 - nu) */
 } pal_contact_patch_options;
 
 typedef struct pal_contact_patch_track {

@@ -84,7 +84,6 @@ void pal_grasp_publish(pal_grasp *g, pal_tool *tool, double k_N_m, double c_Ns_m
     pal_copy3(tool->grasp_f0_N, g->force);
     K[1] = K[2] = K[4] = 0;
     K[0] = K[3] = K[5] = *k;
-    if (pal_grasp_compliance_series(&g->compliance, k_N_m, K))
-        *k = fmax(STIFFNESS_N_M.low, (K[0] + K[3] + K[5]) / 3);
+    if (pal_grasp_compliance_series(&g->compliance, k_N_m, K)) *k = fmax(STIFFNESS_N_M.low, (K[0] + K[3] + K[5]) / 3);
     tool->grasp_b_Ns_m = c_Ns_m * *k / fmax(k_N_m, STIFFNESS_N_M.low);
 }

@@ -60,7 +60,7 @@ struct pal_grasps {
     double *gather;                             /* weights of a new grasp [n_node], 0 between */
     double asked_N_m, damping_s, asked_reach_m; /* keys */
     double young_Pa, poisson;
-    uint64_t revision; /* adaptive bodies: of the nodes that are held */
+    uint64_t revision;             /* adaptive bodies: of the nodes that are held */
     pal_tissue_compliance *tissue; /* explicit solvers only, else NULL */
 };
 

@@ -99,8 +99,8 @@ bool pal_grasp_settle(void *self, pal_step *step, const double *moved, bool last
         int n_find = implicit->found ? 0 : transferred && g->compliance.n_known < 3 ? 3 : 1;
         implicit->found = true;
         for (int k = 0; k < n_find; k++)
-            pal_grasp_compliance_update(&g->compliance, step->body, step->body->compliance, g->node, g->weight, g->n_node, tool->here_m,
-                                        SHALLOW_RADII * tool->radius_m, step->scratch);
+            pal_grasp_compliance_update(&g->compliance, step->body, step->body->compliance, g->node, g->weight,
+                                        g->n_node, tool->here_m, SHALLOW_RADII * tool->radius_m, step->scratch);
         pal_grasp_publish(g, tool, implicit->k_N_m, implicit->k_N_m * grasps->damping_s);
     }
     return again;

@@ -55,6 +55,7 @@ bool pal_haptic_stiffness_find(const pal_haptic_stiffness *known, pal_contact_gr
     const pal_haptic_stiffness_entry *e = &known->entry[i < 0 ? 0 : i];
     double change[3];
     group->k_N_m = i < 0 ? 0 : e->k_N_m;
+    group->sideways = i < 0 ? 0 : e->sideways;
     if (i < 0) return true;
     pal_scale3(change, group->force_N, group->normal);
     pal_axpy3(change, -e->force_N, e->normal);
@@ -78,7 +79,11 @@ static void keep(pal_haptic_stiffness *known, pal_contact_group *group, const do
     if (i < 0) i = known->next++ % PAL_CONTACT_PATCH_MAX;
     group->k_N_m = k_N_m;
     pal_haptic_stiffness_entry *e = &known->entry[i];
+    /* another contact that takes its place knows nothing across */
+    const bool same =
+        e->used && e->contact == (group->force_N > 0) && pal_dot3(e->normal, group->normal) > PAL_SAME_COSINE;
     *e = (pal_haptic_stiffness_entry){.used = true,
+                                      .sideways = same ? e->sideways : 0,
                                       .time_s = known->time_s,
                                       .contact = group->force_N > 0,
                                       .force_N = group->force_N,
@@ -153,6 +158,33 @@ static void add_point(const pal_contact_points *points, const pal_body *body, in
     pal_contact_slot part[PAL_CONTACT_POINT_SLOTS];
     int m = pal_contact_points_slots(points, body, point, part);
     for (int k = 0; k < m; k++) to[pal_contact_points_slot_node(body, part[k].slot)] += weight * part[k].weight;
+}
+
+bool pal_haptic_stiffness_across(pal_haptic_stiffness *known, const pal_contact_group *group,
+                                 const pal_contact_points *points, const pal_body *body,
+                                 const pal_compliance *compliance, const pal_contact *contact, int n, double k_N_m,
+                                 pal_arena *scratch)
+{
+    const int at = find_entry(known, group);
+    pal_haptic_stiffness_entry *e = &known->entry[at < 0 ? 0 : at];
+    if (at < 0 || !e->contact || e->n_across >= 2) return false;
+    size_t used = pal_arena_used(scratch);
+    double *sum = PAL_NEW(scratch, double, body->n_node), *answer = PAL_NEW(scratch, double, 3 * (size_t)body->n_node);
+    double across[2][3], mean[3], inward[3], force = 0;
+    pal_scale3(inward, -1, group->normal);
+    for (int pass = 0; pass < 2 && sum; pass++)
+        for (int i = 0; i < n; i++) {
+            if (contact[i].normal_N <= 0 || !pal_contact_group_has(inward, contact[i].away)) continue;
+            if (pass == 0) force += contact[i].normal_N;
+            if (pass == 1) add_point(points, body, contact[i].point, contact[i].normal_N / force, sum);
+        }
+    pal_contact_group_across(e->normal, across);
+    if (force > 0 && k_N_m > 0 &&
+        solve_mean(body, compliance, NULL, sum, body->n_node, across[e->n_across], mean, answer, scratch))
+        e->give_m_N[e->n_across] = 1 / k_N_m + fmax(0, pal_dot3(mean, across[e->n_across])), e->n_across++;
+    pal_arena_rewind(scratch, used);
+    if (e->n_across == 2 && e->k_N_m > 0) e->sideways = 2 / (e->give_m_N[0] + e->give_m_N[1]) / e->k_N_m;
+    return true;
 }
 
 void pal_haptic_stiffness_near(pal_haptic_stiffness *known, pal_contact_group *group, const double at_m[3],

@@ -122,7 +122,8 @@ pal_err pal_push_make_explicit(pal_push *push, pal_build *build)
     push->tissue = PAL_NEW(build->arena, pal_tissue_compliance, 1);
     push->springs = PAL_NEW(build->arena, pal_contact_springs, 1);
     if (!push->tissue || !push->springs) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_contact_springs_make(&push->points, build->body, PAL_CONTACT_IMPLICIT_MAX, build->arena, push->springs));
+    PAL_TRY(
+        pal_contact_springs_make(&push->points, build->body, PAL_CONTACT_IMPLICIT_MAX, build->arena, push->springs));
     size_t scratch = pal_haptic_stiffness_scratch(build->body) + PAL_CONTACT_IMPLICIT_MAX * sizeof(pal_contact) +
                      (size_t)push->points.sample.max_point * 4 * sizeof(double) + CONTACT_MAX + 256;
     if (build->scratch_byte < scratch) build->scratch_byte = scratch;

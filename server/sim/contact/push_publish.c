@@ -71,8 +71,8 @@ static void find_near(pal_push *push, pal_tool_contact *t, const double here[3],
             sum += weight[n++] = area;
         }
     for (int i = 0; i < n; i++) weight[i] /= sum;
-    pal_haptic_stiffness_near(&t->stiffness, group, here, &push->points, step->body, compliance(push, step->body), point,
-                              weight, n, k, step->scratch);
+    pal_haptic_stiffness_near(&t->stiffness, group, here, &push->points, step->body, compliance(push, step->body),
+                              point, weight, n, k, step->scratch);
 }
 
 /* stiffness of an explicit contact: the springs that press, as stiff as their forces are, or each second, third ... */
@@ -106,8 +106,18 @@ static void find_stiffness(pal_push *push, pal_tool_contact *t, const pal_tool *
     double here[3], radius = tool->radius_m;
     pal_sub3(here, tool->here_m, step->body->offset_m);
     t->stiffness.time_s = step->time_s;
-    if (!pal_haptic_stiffness_find(&t->stiffness, group, here, SHALLOW_RADII * radius)) return;
+    const bool due = pal_haptic_stiffness_find(&t->stiffness, group, here, SHALLOW_RADII * radius);
     if (push->n_stiffness >= STIFFNESS_BUDGET || (group->force_N > 0 && implicit && implicit->solve.constant)) return;
+    if (!due) {
+        double k = implicit ? implicit->solve.friction_N_m : 0;
+        for (int i = 0; i < t->n_contact && !implicit; i++)
+            if (t->contact[i].normal_N > 0) k += t->contact[i].normal_N / t->contact[i].depth_m;
+        push->n_stiffness +=
+            push->friction > 0 &&
+            pal_haptic_stiffness_across(&t->stiffness, group, &push->points, step->body, compliance(push, step->body),
+                                        t->contact, t->n_contact, k, step->scratch);
+        return;
+    }
     push->n_stiffness++;
     if (group->force_N > 0 && implicit)
         pal_haptic_stiffness_contact(&t->stiffness, group, here, step->body->compliance, push->springs,

@@ -53,7 +53,8 @@ static bool multiply(pal_tissue_compliance *tissue, const double *p)
     if (part == 0) return true;
     tissue->credit -= 1;
     bool good = find_forces(tissue, -part, p);
-    for (int k = 0; k < body->n_active; k++) pal_copy3(tissue->low + 3 * (size_t)pal_body_point(body, k), body->g + 3 * (size_t)pal_body_point(body, k));
+    for (int k = 0; k < body->n_active; k++)
+        pal_copy3(tissue->low + 3 * (size_t)pal_body_point(body, k), body->g + 3 * (size_t)pal_body_point(body, k));
     good = good && find_forces(tissue, part, p);
     for (int k = 0; k < body->n_active; k++) {
         const int i = pal_body_point(body, k);

@@ -12,15 +12,15 @@
 #define PAL_SIM_CONTACT_TISSUE_COMPLIANCE_H
 #include "server/sim/core/effect.h"
 
-/* loads whose answers are kept: one for each patch or axis of a grasp, of one tool at a time */
-enum { PAL_TISSUE_ANSWERS = 4 };
+/* loads whose answers are kept: of two patches, along and across */
+enum { PAL_TISSUE_ANSWERS = 8 };
 
 typedef struct pal_tissue_answer {
-    double *force, *move;      /* N, m                                       [n_dof][3] */
-    double *left, *direction;  /* residual, N; last direction                [n_dof][3] */
-    double *before;            /* preconditioned residual of the iteration before [n_dof][3] */
-    double size2, fall2;       /* squared norm of force, 0: empty; residual . before */
-    uint64_t used;             /* index of the last call that used it */
+    double *force, *move;     /* N, m                                       [n_dof][3] */
+    double *left, *direction; /* residual, N; last direction                [n_dof][3] */
+    double *before;           /* preconditioned residual of the iteration before [n_dof][3] */
+    double size2, fall2;      /* squared norm of force, 0: empty; residual . before */
+    uint64_t used;            /* index of the last call that used it */
 } pal_tissue_answer;
 
 typedef struct pal_tissue_compliance {
@@ -28,10 +28,10 @@ typedef struct pal_tissue_compliance {
     pal_step *step;      /* the present one, borrowed */
     double credit;       /* iterations that may be made now */
     uint64_t n_call, revision;
-    bool known;                     /* inverse holds for the topology `revision` */
-    double *x, *low, *product;      /* [n_dof][3] */
-    double *inverse;                /* of the diagonal, m/N [n_dof] */
-    double *bound;                  /* N/m [n_node] */
+    bool known;                /* inverse holds for the topology `revision` */
+    double *x, *low, *product; /* [n_dof][3] */
+    double *inverse;           /* of the diagonal, m/N [n_dof] */
+    double *bound;             /* N/m [n_node] */
     pal_tissue_answer answer[PAL_TISSUE_ANSWERS];
 } pal_tissue_compliance;
 

@@ -77,8 +77,8 @@ static jitter watch(model_scene *m, const double at[3], double tremor_m, int n)
         if (!hold(m, x, false) || tool_of(m)->n_patch == 0) return (jitter){INFINITY, INFINITY, INFINITY};
         const pal_contact_patch *now = &tool_of(m)->patch[0];
         pal_sub3(move, now->point_m, tool_of(m)->here_m);
-        worst.force = fmax(worst.force, fabs(now->k1_N_m * pal_dot3(move, now->normal) /
-                                             pal_norm3(tool_of(m)->force_N) - 1));
+        worst.force =
+            fmax(worst.force, fabs(now->k1_N_m * pal_dot3(move, now->normal) / pal_norm3(tool_of(m)->force_N) - 1));
         pal_sub3(move, now->point_m, last.point_m);
         if (i > 0) worst.k = fmax(worst.k, fabs(now->k1_N_m / last.k1_N_m - 1));
         if (i > 0) worst.plane_m = fmax(worst.plane_m, fabs(pal_dot3(move, now->normal)));
@@ -96,7 +96,8 @@ static bool force_at(model_scene *m, double at[3], double x, double y, double z,
     return go(m, at, base, SETTLE, grasp);
 }
 
-/* k1 against the slope of the normal force between half a millimetre less and more, at three depths */
+/* k1 against the slope of the normal force between half a millimetre less and more, at three depths. Adaptive surfaces
+ * have other nodes half a millimetre on, so that their slope is not quite that of one surface */
 static void a_resting_hand_has_a_steady_model_of_the_right_stiffness(void)
 {
     for (model_kind kind = 0; kind < MODEL_KINDS; kind++) {
@@ -123,26 +124,27 @@ static void a_resting_hand_has_a_steady_model_of_the_right_stiffness(void)
             CHECK_LE(trembling.k, 0.05);
             CHECK_LE(trembling.plane_m, 1e-4);
             CHECK_LE(still.force, 1e-6);
-            CHECK_NEAR(told, slope, 0.12 * slope);
+            CHECK_NEAR(told, slope, (kind == SHELL ? 0.12 : 0.06) * slope);
         }
         model_scene_close(&m);
     }
 }
 
-/* all of K against forces a millimetre to each side */
+/* all of K against forces a tenth of a millimetre to each side; and the force that it foretells a millimetre away */
 static void a_grasp_has_the_tangent_stiffness_of_tissue(void)
 {
     for (model_kind kind = 0; kind < MODEL_KINDS; kind++) {
         static const int place[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
         model_scene m;
-        double at[3], worst = 0, side_m = 0.001;
+        double at[3], worst = 0, far = 0, side_m = 0.0001;
         REQUIRE(begin(&m, kind, 0, at));
         double to[3] = {at[0], at[1], at[2] + 0.001};
         REQUIRE(go(&m, at, to, 30, false) && hold(&m, at, true));
         to[2] += 0.004, to[0] += 0.002;
         REQUIRE(go(&m, at, to, SETTLE, true));
         const pal_tool *tool = tool_of(&m);
-        double K[6];
+        double K[6], f0[3];
+        pal_copy3(f0, tool->grasp_f0_N);
         REQUIRE(tool->has_grasp);
         memcpy(K, tool->grasp_k_N_m, sizeof K);
         CHECK_LE(pal_dist3(tool->grasp_x0_m, at), 1e-12);
@@ -152,17 +154,25 @@ static void a_grasp_has_the_tangent_stiffness_of_tissue(void)
             double less[3], more[3];
             REQUIRE(force_at(&m, at, -side_m * (c == 0), -side_m * (c == 1), -side_m * (c == 2), true, less));
             REQUIRE(force_at(&m, at, side_m * (c == 0), side_m * (c == 1), side_m * (c == 2), true, more));
-            for (int i = 0; i < 3; i++)
-                worst = fmax(worst, fabs(K[place[i][c]] + (more[i] - less[i]) / (2 * side_m)));
+            for (int i = 0; i < 3; i++) worst = fmax(worst, fabs(K[place[i][c]] + (more[i] - less[i]) / (2 * side_m)));
+            for (int s = -1; s <= 1; s += 2) {
+                double to_m[3] = {0}, off[3];
+                to_m[c] = 0.001 * s;
+                REQUIRE(force_at(&m, at, to_m[0], to_m[1], to_m[2], true, off));
+                for (int i = 0; i < 3; i++) off[i] -= f0[i] - K[place[i][c]] * to_m[c];
+                far = fmax(far, pal_norm3(off) / pal_norm3(f0));
+            }
         }
-        const double minor = K[0] * K[3] - K[1] * K[1],
-                     det = K[0] * (K[3] * K[5] - K[4] * K[4]) - K[1] * (K[1] * K[5] - K[4] * K[2]) +
-                           K[2] * (K[1] * K[4] - K[3] * K[2]);
-        printf("  %-16s %.3g N, K %.4g %.4g %.4g / %.4g %.4g / %.4g, worst %.2g of the largest\n",
-               model_kind_name[kind], pal_norm3(tool->mean_force_N), K[0], K[1], K[2], K[3], K[4], K[5],
-               worst / largest);
+        const double minor = K[0] * K[3] - K[1] * K[1], det = K[0] * (K[3] * K[5] - K[4] * K[4]) -
+                                                              K[1] * (K[1] * K[5] - K[4] * K[2]) +
+                                                              K[2] * (K[1] * K[4] - K[3] * K[2]);
+        printf("  %-16s %.3g N, K %.4g %.4g %.4g / %.4g %.4g / %.4g, %.2g %% of the largest off; a millimetre away "
+               "%.2g %% of the force\n",
+               model_kind_name[kind], pal_norm3(f0), K[0], K[1], K[2], K[3], K[4], K[5], 100 * worst / largest,
+               100 * far);
         CHECK(K[0] > 0 && minor > 0 && det > 0);
-        CHECK_LE(worst, 0.05 * largest);
+        CHECK_LE(worst, 0.02 * largest);
+        CHECK_LE(far, 0.03);
         CHECK(tool->grasp_b_Ns_m >= 0);
         model_scene_close(&m);
     }
@@ -177,18 +187,32 @@ static void split(const model_scene *m, double *normal_N, double across[3])
     pal_axpy3(across, -*normal_N, patch->normal);
 }
 
-/* the stroke is 10 mm at 20 mm/s; sticking is measured 0.2 mm to each side, far from slipping */
+/* settled stiffness along an axis by a fifth of the way to slipping, to the side that sticks: friction that is near its
+ * limit at rest slips on the other, which is softer */
+static bool stick(model_scene *m, double at[3], int axis, double side_m, double *k_N_m)
+{
+    double less[3], more[3], mid[3];
+    if (!force_at(m, at, -side_m * (axis == 0), -side_m * (axis == 1), 0, false, less)) return false;
+    pal_copy3(mid, tool_of(m)->mean_force_N);
+    if (!force_at(m, at, side_m * (axis == 0), side_m * (axis == 1), 0, false, more)) return false;
+    *k_N_m = fmax(less[axis] - mid[axis], mid[axis] - more[axis]) / side_m;
+    return true;
+}
+
+/* a stroke of 10 mm at 20 mm/s after a press of 3 mm */
 static void friction_is_what_the_patch_says(void)
 {
     for (model_kind kind = 0; kind < MODEL_KINDS; kind++) {
         model_scene m;
-        double at[3], less[3], more[3], worst = 0, mean = 0, normal, across[3], side_m = 0.0002;
+        double at[3], k[2], worst = 0, mean = 0, normal, across[3];
         REQUIRE(begin(&m, kind, friction, at));
         double to[3] = {at[0], at[1], at[2] - 0.003};
         REQUIRE(go(&m, at, to, SETTLE, false));
         const pal_contact_patch patch = tool_of(&m)->patch[0];
-        REQUIRE(force_at(&m, at, -side_m, 0, 0, false, less) && force_at(&m, at, side_m, 0, 0, false, more));
-        const double slope = -(more[0] - less[0]) / (2 * side_m);
+        split(&m, &normal, across);
+        const double side_m = 0.2 * friction * normal / patch.kt_N_m;
+        REQUIRE(stick(&m, at, 0, side_m, &k[0]) && stick(&m, at, 1, side_m, &k[1]));
+        const double slope = 2 / (1 / k[0] + 1 / k[1]);
         int n = 0;
         for (int i = 1; i <= 30; i++) {
             to[0] = at[0] + speed_m_s * m.scene->step_s;
@@ -198,11 +222,13 @@ static void friction_is_what_the_patch_says(void)
             worst = fmax(worst, fabs(pal_norm3(across) / (friction * normal) - 1));
             mean += (pal_norm3(across) / (friction * normal) - 1), n++;
         }
-        printf("  %-16s kt %.4g, slope %.4g N/m; sliding %+.2g %% of mu N, worst %.2g %%, %.3g N\n",
-               model_kind_name[kind], patch.kt_N_m, slope, 100 * mean / n, 100 * worst, normal);
+        printf(
+            "  %-16s kt %.4g, slopes %.4g and %.4g N/m (%+.1f %%); sliding %+.2g %% of mu N, worst %.2g %%, %.3g N\n",
+            model_kind_name[kind], patch.kt_N_m, k[0], k[1], 100 * (patch.kt_N_m / slope - 1), 100 * mean / n,
+            100 * worst, normal);
         CHECK(patch.mu_static == friction && patch.mu_dynamic == friction);
         CHECK_LE(fabs(mean / n), 0.02);
-        CHECK_NEAR(patch.kt_N_m, slope, 0.25 * slope);
+        CHECK_NEAR(patch.kt_N_m, slope, 0.1 * slope);
         model_scene_close(&m);
     }
 }
