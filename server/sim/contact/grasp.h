@@ -43,6 +43,7 @@ typedef struct pal_grasp {
     double reach_m;               /* when it closed                                       */
     double offset[3];             /* o, in the tool's axes at quaternion 1                */
     double force[3];              /* on the tool, this sub-step                           */
+    double torque_Nm[3];          /* counted in the tool's                                */
     pal_adaptive_grasp *adaptive; /* adaptive bodies only, else NULL                      */
     pal_stiffness_fit fit;        /* rendered stiffness                                   */
     pal_grasp_compliance compliance;

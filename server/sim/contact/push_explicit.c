@@ -20,11 +20,12 @@
 
 /* Coulomb friction: the tool's displacement across the tissue stretches a spring as stiff as the contact, which slips
  * at friction times the normal force; shared out like the normal force */
-static void add_friction(pal_push *push, pal_tool_contact *t, const double sum[3], double stiffness, double dt_s)
+static void add_friction(pal_push *push, pal_tool_contact *t, const pal_tool *tool, const double sum[3],
+                         double stiffness, double dt_s)
 {
     double size = pal_norm3(sum), drift[3], along[3], total = 0;
     if (push->friction <= 0 || !pal_unit3(along, sum, 0)) return;
-    pal_copy3(drift, t->proxy.v);
+    pal_push_surface_velocity(t, tool, drift);
     for (int i = 0; i < t->n_contact; i++) total += pal_norm3(t->contact[i].force);
     for (int i = 0; i < t->n_contact; i++) {
         double v[3];
@@ -97,7 +98,7 @@ static void press(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step 
     }
     if (push->regime->limits_rise) stiffness *= limit_rise(t, sum);
     if (!pal_finite3(sum) || pal_dot3(sum, sum) == 0) return;
-    add_friction(push, t, sum, stiffness, step->dt_s);
+    add_friction(push, t, tool, sum, stiffness, step->dt_s);
     pal_set3(sum, 0, 0, 0);
     pal_contact_points_begin_slots(&push->points);
     for (int i = 0; i < t->n_contact; i++) {

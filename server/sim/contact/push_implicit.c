@@ -63,7 +63,8 @@ static void begin(pal_push *push, pal_tool_contact *t, const pal_tool *tool, pal
         if (t->contact[i].depth_m > 0) stiffness += t->contact[i].k_N_m;
     }
     (void)pal_tool_contact_friction(t, stiffness, implicit->solve.next_slip_m);
-    pal_scale3(move, step->dt_s, t->proxy.v);
+    pal_push_surface_velocity(t, tool, move);
+    pal_scale3(move, step->dt_s, move);
     pal_contact_implicit_begin(&implicit->solve, push->springs, step->body, t->contact, t->n_contact, push->friction,
                                move);
     t->n_contact = implicit->solve.n_contact;

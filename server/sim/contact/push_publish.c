@@ -128,9 +128,33 @@ static void find_stiffness(pal_push *push, pal_tool_contact *t, const pal_tool *
         find_near(push, t, here, step, x, group);
 }
 
+/* Contacts act on the tool's surface, at (radius - depth) away; a force toward the centre has no torque, friction has
+ */
+static void add_torque(pal_tool_contact *t, pal_tool *tool)
+{
+    double torque[3];
+    pal_sub3(tool->torque_Nm, tool->torque_Nm, t->torque_Nm);
+    pal_set3(t->torque_Nm, 0, 0, 0);
+    for (int i = 0; i < t->n_contact; i++) {
+        const pal_contact *c = &t->contact[i];
+        if (!(c->normal_N > 0)) continue;
+        pal_cross3(torque, c->force, c->away);
+        pal_axpy3(t->torque_Nm, tool->radius_m - c->depth_m, torque);
+    }
+    pal_add3(tool->torque_Nm, tool->torque_Nm, t->torque_Nm);
+}
+
+void pal_push_surface_velocity(const pal_tool_contact *t, const pal_tool *tool, double velocity_m_s[3])
+{
+    pal_cross3(velocity_m_s, t->proxy.normal, tool->omega_rad_s);
+    pal_scale3(velocity_m_s, tool->radius_m, velocity_m_s);
+    pal_add3(velocity_m_s, velocity_m_s, t->proxy.v);
+}
+
 void pal_push_publish(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step *step)
 {
     if (!t->active) return;
+    add_torque(t, tool);
     pal_contact_group group[PAL_CONTACT_PATCH_MAX] = {0};
     int n = 0;
     size_t used = pal_arena_used(step->scratch);

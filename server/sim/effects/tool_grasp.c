@@ -294,6 +294,7 @@ static pal_err run(void *self, pal_step *step)
     if (grasps->tissue && step->sub == step->n_sub - 1) pal_tissue_compliance_begin(grasps->tissue, step);
     for (int t = 0; t < n_tool; t++) {
         pal_grasp *g = &grasps->grasp[t];
+        pal_set3(g->torque_Nm, 0, 0, 0);
         if (step->sub == 0) begin_tool(grasps, g, &tools->tool[t], step->body);
         if (g->implicit) g->implicit->pulls = false;
         if (g->closed && !step->body->frozen) grasps->act(grasps, g, &tools->tool[t], step);

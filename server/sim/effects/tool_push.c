@@ -176,6 +176,7 @@ static void approach(pal_push *push, pal_tool_contact *h, pal_tool *tool, pal_st
 {
     h->n_contact = 0;
     pal_set3(h->total, 0, 0, 0);
+    pal_set3(h->torque_Nm, 0, 0, 0);
     if (!h->active) return;
     double here[3];
     pal_sub3(here, tool->here_m, step->body->offset_m);

@@ -233,10 +233,91 @@ static void friction_is_what_the_patch_says(void)
     }
 }
 
+/* torque about the tool's centre of the loads on tissue, as nodes were when they were given */
+static void torque_of_loads(const model_scene *m, double torque[3])
+{
+    const pal_body *body = m->body;
+    const double dt_s = m->scene->step_s / pal_world_substeps(m->world);
+    pal_set3(torque, 0, 0, 0);
+    for (size_t i = 0; i < (size_t)body->n_node; i++) {
+        double arm[3], part[3];
+        pal_sub3(arm, body->d + 3 * i, tool_of(m)->here_m);
+        pal_axpy3(arm, -dt_s, body->dv + 3 * i);
+        pal_cross3(part, arm, body->load + 3 * i);
+        pal_add3(torque, torque, part);
+    }
+}
+
+/* what a tool feels is the opposite of what tissue receives. Friction acts on a cap 3 mm high, so its arm along the
+ * normal is between the radius and 3 mm less */
+static void torque_is_that_of_friction_and_of_the_grasp(void)
+{
+    for (model_kind kind = 0; kind < MODEL_KINDS; kind++) {
+        model_scene m;
+        double at[3], normal, across[3], on_tissue[3], sum[3];
+        REQUIRE(begin(&m, kind, friction, at));
+        double to[3] = {at[0], at[1], at[2] - 0.003};
+        REQUIRE(go(&m, at, to, SETTLE, false));
+        to[0] += 0.01;
+        REQUIRE(go(&m, at, to, 0, false));
+        split(&m, &normal, across);
+        const double slid = pal_norm3(tool_of(&m)->torque_Nm) / (pal_norm3(across) * 0.012);
+        REQUIRE(go(&m, at, to, SETTLE, false));
+        torque_of_loads(&m, on_tissue);
+        pal_add3(sum, on_tissue, tool_of(&m)->torque_Nm);
+        const double pushed = pal_norm3(sum) / pal_norm3(on_tissue);
+        to[2] += 0.004;
+        REQUIRE(go(&m, at, to, SETTLE, false) && hold(&m, at, true));
+        to[0] += 0.004, to[2] += 0.004;
+        REQUIRE(go(&m, at, to, SETTLE, true));
+        torque_of_loads(&m, on_tissue);
+        pal_add3(sum, on_tissue, tool_of(&m)->torque_Nm);
+        const double held = pal_norm3(sum) / pal_norm3(on_tissue);
+        double arm[3];
+        pal_cross3(arm, tool_of(&m)->grasp_arm_m, tool_of(&m)->grasp_f0_N);
+        printf("  %-16s sliding %.4g of T R; off the tissue's by %.2g pressing, %.2g holding %.3g Nm\n",
+               model_kind_name[kind], slid, pushed, held, pal_norm3(on_tissue));
+        CHECK(slid <= 1 && slid >= 1 - 0.003 / 0.012);
+        CHECK_LE(pushed, 0.05);
+        CHECK_LE(held, 0.01);
+        CHECK_LE(pal_dist3(arm, tool_of(&m)->torque_Nm), 1e-6 * pal_norm3(arm));
+        model_scene_close(&m);
+    }
+}
+
+/* a tool that turns on the spot, slowly, drags the tissue it presses, and not without friction */
+static void a_turning_tool_drags_by_its_surface(void)
+{
+    for (int k = 0; k < 2; k++)
+        for (model_kind kind = 0; kind < MODEL_KINDS; kind++) {
+            model_scene m;
+            double at[3], normal, before[3], across[3];
+            REQUIRE(begin(&m, kind, k ? friction : 0, at));
+            double to[3] = {at[0], at[1], at[2] - 0.003};
+            REQUIRE(go(&m, at, to, SETTLE, false));
+            split(&m, &normal, before);
+            for (int i = 1; i <= 60; i++) {
+                const double half = 0.5 * i / 60;
+                pal_pose pose = {.position_m = {at[0], at[1], at[2]}, .quat = {cos(half), 0, sin(half), 0}};
+                REQUIRE(!pal_world_pose(m.world, 0, &pose) && model_scene_steps(&m, 1));
+            }
+            /* about y, so that the lowest point goes to -x, tissue with it, and the tool is drawn to +x */
+            CHECK_NEAR(tool_of(&m)->omega_rad_s[1], 1, 1e-9);
+            split(&m, &normal, across);
+            printf("  %-16s mu %.1f: %.3g of N along x, %.3g before\n", model_kind_name[kind], k ? friction : 0,
+                   across[0] / normal, before[0] / normal);
+            if (k) CHECK_NEAR(across[0] / normal, friction, 0.05 * friction);
+            if (!k) CHECK_LE(fabs(across[0] - before[0]), 0.01 * normal);
+            model_scene_close(&m);
+        }
+}
+
 int main(void)
 {
     RUN_LONG(a_resting_hand_has_a_steady_model_of_the_right_stiffness);
     RUN_LONG(a_grasp_has_the_tangent_stiffness_of_tissue);
     RUN_LONG(friction_is_what_the_patch_says);
+    RUN_LONG(torque_is_that_of_friction_and_of_the_grasp);
+    RUN_LONG(a_turning_tool_drags_by_its_surface);
     return check_report();
 }
