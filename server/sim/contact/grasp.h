@@ -7,7 +7,6 @@
 #ifndef PAL_SIM_CONTACT_GRASP_H
 #define PAL_SIM_CONTACT_GRASP_H
 #include "server/sim/contact/haptic_stiffness.h"
-#include "server/sim/contact/tissue_compliance.h"
 #include "server/sim/core/effect.h"
 #include "server/sim/surface/adaptive_grasp.h"
 
@@ -61,8 +60,7 @@ struct pal_grasps {
     double *gather;                             /* weights of a new grasp [n_node], 0 between */
     double asked_N_m, damping_s, asked_reach_m; /* keys */
     double young_Pa, poisson;
-    uint64_t revision;             /* adaptive bodies: of the nodes that are held */
-    pal_tissue_compliance *tissue; /* explicit solvers only, else NULL */
+    uint64_t revision; /* adaptive bodies: of the nodes that are held */
 };
 
 void pal_grasp_act_explicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *tool, pal_step *step);

@@ -45,7 +45,7 @@ void pal_grasp_act_explicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *to
     tool->holding = true;
     if (step->sub != step->n_sub - 1) return;
     if (!step->body->frozen)
-        pal_grasp_compliance_update(&g->compliance, body, &grasps->tissue->hook, g->node, g->weight, g->n_node,
-                                    tool->here_m, SHALLOW_RADII * tool->radius_m, step->scratch);
+        pal_grasp_compliance_update(&g->compliance, body, body->compliance, g->node, g->weight, g->n_node, tool->here_m,
+                                    SHALLOW_RADII * tool->radius_m, step->scratch);
     pal_grasp_publish(g, tool, k, c);
 }

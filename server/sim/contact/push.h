@@ -34,11 +34,10 @@ struct pal_push {
     int n_tool, body_index;
     pal_tool_contact tool[PAL_TOOL_MAX];
     double asked_Pa_m, friction, clamp_S, asked_near_m, slip_S, slip_s; /* keys */
-    pal_material material;         /* the body's, Poisson's ratio at most PAL_POISSON_CLAMP                */
-    float *point_Pa;               /* pal_contact_points_young                                             */
-    pal_contact_springs *springs;  /* implicit only                                                        */
-    pal_tissue_compliance *tissue; /* explicit only                                                       */
-    int n_stiffness, n_step;       /* stiffnesses found in this step; steps, to give each tool its turn    */
+    pal_material material;        /* the body's, Poisson's ratio at most PAL_POISSON_CLAMP                */
+    float *point_Pa;              /* pal_contact_points_young                                             */
+    pal_contact_springs *springs; /* implicit only                                                        */
+    int n_stiffness, n_step;      /* stiffnesses found in this step; steps, to give each tool its turn    */
 };
 
 /* EXPLICIT_PRESSURE E / radius, or what the scene says */

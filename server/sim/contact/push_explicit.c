@@ -120,15 +120,15 @@ static void press(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step 
 
 pal_err pal_push_make_explicit(pal_push *push, pal_build *build)
 {
-    push->tissue = PAL_NEW(build->arena, pal_tissue_compliance, 1);
     push->springs = PAL_NEW(build->arena, pal_contact_springs, 1);
-    if (!push->tissue || !push->springs) return PAL_ERR_MEMORY;
+    if (!push->springs) return PAL_ERR_MEMORY;
     PAL_TRY(
         pal_contact_springs_make(&push->points, build->body, PAL_CONTACT_IMPLICIT_MAX, build->arena, push->springs));
     size_t scratch = pal_haptic_stiffness_scratch(build->body) + PAL_CONTACT_IMPLICIT_MAX * sizeof(pal_contact) +
                      (size_t)push->points.sample.max_point * 4 * sizeof(double) + CONTACT_MAX + 256;
     if (build->scratch_byte < scratch) build->scratch_byte = scratch;
-    return pal_tissue_compliance_make(build->body, build->arena, push->tissue);
+    build->body->wants_compliance = true;
+    return PAL_ERR_OK;
 }
 
 static void act(pal_push *push, int n_tool, pal_step *step)
@@ -138,7 +138,7 @@ static void act(pal_push *push, int n_tool, pal_step *step)
     if (step->sub != step->n_sub - 1) return;
     /* each tool in turn is the first to have its patches' stiffness found */
     push->n_step++, push->n_stiffness = 0;
-    pal_tissue_compliance_begin(push->tissue, step);
+    if (step->body->compliance) step->body->compliance->begin(step->body->compliance->self, step);
     for (int k = 0; k < n_tool; k++) {
         const int t = (k + push->n_step) % n_tool;
         pal_push_publish(push, &push->tool[t], &step->tools->tool[t], step);

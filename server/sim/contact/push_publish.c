@@ -46,11 +46,6 @@ void pal_push_follow_side(pal_tool_contact *t, const double side_before[3], doub
 
 /* ---- patches ---- */
 
-static const pal_compliance *compliance(const pal_push *push, const pal_body *body)
-{
-    return push->tissue ? &push->tissue->hook : body->compliance;
-}
-
 /* stiffness of a group without contact: of what the sphere would lie on, were it NEAREST_RADII nearer */
 static void find_near(pal_push *push, pal_tool_contact *t, const double here[3], pal_step *step, const double *x,
                       pal_contact_group *group)
@@ -71,8 +66,8 @@ static void find_near(pal_push *push, pal_tool_contact *t, const double here[3],
             sum += weight[n++] = area;
         }
     for (int i = 0; i < n; i++) weight[i] /= sum;
-    pal_haptic_stiffness_near(&t->stiffness, group, here, &push->points, step->body, compliance(push, step->body),
-                              point, weight, n, k, step->scratch);
+    pal_haptic_stiffness_near(&t->stiffness, group, here, &push->points, step->body, step->body->compliance, point,
+                              weight, n, k, step->scratch);
 }
 
 /* stiffness of an explicit contact: the springs that press, as stiff as their forces are, or each second, third ... */
@@ -93,7 +88,7 @@ static void find_pressed(pal_push *push, pal_tool_contact *t, const double here[
         if (pal_contact_springs_add(push->springs, contact[n].point, contact[n].away, contact[n].k_N_m) < 0) break;
         n++;
     }
-    pal_haptic_stiffness_contact(&t->stiffness, group, here, compliance(push, step->body), push->springs, 0, contact, n,
+    pal_haptic_stiffness_contact(&t->stiffness, group, here, step->body->compliance, push->springs, 0, contact, n,
                                  t->limits.radius_m, step->scratch);
     pal_arena_rewind(step->scratch, used);
 }
@@ -114,7 +109,7 @@ static void find_stiffness(pal_push *push, pal_tool_contact *t, const pal_tool *
             if (t->contact[i].normal_N > 0) k += t->contact[i].normal_N / t->contact[i].depth_m;
         push->n_stiffness +=
             push->friction > 0 &&
-            pal_haptic_stiffness_across(&t->stiffness, group, &push->points, step->body, compliance(push, step->body),
+            pal_haptic_stiffness_across(&t->stiffness, group, &push->points, step->body, step->body->compliance,
                                         t->contact, t->n_contact, k, step->scratch);
         return;
     }
@@ -171,7 +166,7 @@ void pal_push_publish(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_s
         while (n < PAL_CONTACT_PATCH_MAX && pal_contact_group_near(t->proxy.x, radius, pal_push_near_m(push, radius), x,
                                                                    t->n_list, group, n, &group[n]))
             n++;
-        for (int b = 0; b < n && compliance(push, step->body) && t->hold.share == 0; b++)
+        for (int b = 0; b < n && step->body->compliance && t->hold.share == 0; b++)
             find_stiffness(push, t, tool, step, x, &group[b]);
     }
     pal_arena_rewind(step->scratch, used);

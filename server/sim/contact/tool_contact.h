@@ -12,7 +12,6 @@
 #include "server/sim/contact/contact_patch.h"
 #include "server/sim/contact/haptic_stiffness.h"
 #include "server/sim/contact/proxy.h"
-#include "server/sim/contact/tissue_compliance.h"
 #include "server/sim/core/effect.h"
 
 /* additional state with an implicit solver */

@@ -67,15 +67,6 @@ enum { STIFFNESS_PASSES = 2 };
  * test_contact_implicit fails) */
 #define GRASP_STRETCH 0.02
 
-/* ---- static compliance of explicit bodies (test_haptic_models) ---- */
-
-/* products with the stiffness a second: 4 in 1/60 s, 8 evaluations of forces beside the 15 to 20 of the sub-steps */
-#define ITERATIONS_1_S 240
-/* edges of an element. Displacement of a difference of forces: far above rounding, far below a change of stiffness */
-#define DIFFERENCE_EDGES 1e-5
-/* residual over load of an answer */
-#define ANSWER_SHARE 0.02
-
 /* ---- rendered stiffness (test_contact_implicit, test_tool_push, test_tool_grasp) ---- */
 
 /* N/m. Range of stiffness that devices render */

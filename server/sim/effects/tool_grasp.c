@@ -48,7 +48,6 @@ static void reset(void *self, const pal_body *body)
     for (int t = 0; t < grasps->n_tool; t++)
         grasps->grasp[t].closed = grasps->grasp[t].button = false, grasps->grasp[t].n_node = 0;
     memset(grasps->sum_weight, 0, sizeof(double) * (size_t)body->n_node);
-    if (grasps->tissue) pal_tissue_compliance_reset(grasps->tissue);
 }
 
 static pal_err make_grasp(pal_grasp *g, const pal_body *body, pal_arena *arena)
@@ -76,12 +75,7 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
         return PAL_REFUSE(build->diag, "%s: tool_grasp needs a body with a shown surface", entry->path);
     size_t n_node = (size_t)build->body->n_node, scratch = 6 * sizeof(double) * n_node + 256;
     if (build->scratch_byte < scratch) build->scratch_byte = scratch;
-    if (build->body->implicit)
-        build->body->wants_compliance = true;
-    else if (!(grasps->tissue = PAL_NEW(build->arena, pal_tissue_compliance, 1)))
-        return PAL_ERR_MEMORY;
-    else
-        PAL_TRY(pal_tissue_compliance_make(build->body, build->arena, grasps->tissue));
+    build->body->wants_compliance = true;
     grasps->act = build->body->implicit ? pal_grasp_act_implicit : pal_grasp_act_explicit;
     grasps->n_tool = build->scene->n_tool;
     grasps->grasp = PAL_NEW(build->arena, pal_grasp, grasps->n_tool);
@@ -291,7 +285,8 @@ static pal_err run(void *self, pal_step *step)
     pal_tools *tools = step->tools;
     int n_tool = tools->n_tool < grasps->n_tool ? tools->n_tool : grasps->n_tool;
     if (step->sub == 0) update_nodes(grasps, step->body);
-    if (grasps->tissue && step->sub == step->n_sub - 1) pal_tissue_compliance_begin(grasps->tissue, step);
+    const pal_compliance *compliance = step->body->compliance;
+    if (compliance && compliance->begin && step->sub == step->n_sub - 1) compliance->begin(compliance->self, step);
     for (int t = 0; t < n_tool; t++) {
         pal_grasp *g = &grasps->grasp[t];
         pal_set3(g->torque_Nm, 0, 0, 0);

@@ -31,10 +31,9 @@ static pal_err material(void *self, const pal_body *body, const pal_material *ma
 static void reset(void *self, const pal_body *body)
 {
     pal_push *push = self;
-    (void)body;
     push->points.sub_step += 2; /* the body jumped: velocities start again */
     push->n_step = 0;
-    if (push->tissue) pal_tissue_compliance_reset(push->tissue);
+    if (body->compliance && body->compliance->reset) body->compliance->reset(body->compliance->self);
     for (int t = 0; t < push->n_tool; t++) {
         push->tool[t].active = false;
         push->tool[t].stiffness = (pal_haptic_stiffness){.next = 0};

@@ -54,4 +54,7 @@ enum {
     /* Newton iterations, at most, of a sub-step that began with one and gained energy */
     PAL_SAFEGUARD_NEWTON = 8
 };
+/* products with the true stiffness a second for the static compliance of an explicit body: 4 in 1/60 s, 8 evaluations
+ * of forces beside those of some 20 sub-steps (tests/sim/contact/test_haptic_models.c) */
+#define PAL_TISSUE_PRODUCTS_1_S 240
 #endif

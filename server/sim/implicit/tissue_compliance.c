@@ -1,9 +1,9 @@
 /* Static compliance by a few iterations a step (tissue_compliance.h). Sums are over active dofs only. */
-#include "server/sim/contact/tissue_compliance.h"
+#include "server/sim/implicit/tissue_compliance.h"
 
 #include "server/base/vec3.h"
-#include "server/sim/contact/tuning.h"
 #include "server/sim/core/step_guard.h"
+#include "server/sim/implicit/tuning.h"
 
 #include <string.h>
 
@@ -29,7 +29,7 @@ static void add(const pal_body *body, double s, const double *from, double *to)
 /* forces at x + part p, as g; fixed dofs 0 */
 static bool find_forces(pal_tissue_compliance *tissue, double part, const double *p)
 {
-    pal_step step = *tissue->step;
+    pal_step step = tissue->step;
     pal_body *body = step.body;
     step.drag_separate = true;
     for (int k = 0; k < body->n_active; k++) {
@@ -42,13 +42,13 @@ static bool find_forces(pal_tissue_compliance *tissue, double part, const double
 /* product = K p; false: forces failed */
 static bool multiply(pal_tissue_compliance *tissue, const double *p)
 {
-    pal_body *body = tissue->step->body;
+    pal_body *body = tissue->step.body;
     double longest = 0;
     for (int k = 0; k < body->n_active; k++) {
         const size_t i = 3 * (size_t)pal_body_point(body, k);
         longest = fmax(longest, pal_norm3(p + i));
     }
-    const double part = longest > 0 ? DIFFERENCE_EDGES * body->edge_m / longest : 0;
+    const double part = longest > 0 ? PAL_DIFFERENCE_H * body->edge_m / longest : 0;
     if (part == 0) memset(tissue->product, 0, 3 * sizeof(double) * (size_t)body->n_dof);
     if (part == 0) return true;
     tissue->credit -= 1;
@@ -64,33 +64,50 @@ static bool multiply(pal_tissue_compliance *tissue, const double *p)
     return good;
 }
 
-/* the diagonal's inverse, from the components' row sums where dofs are nodes */
+static void reset(void *self)
+{
+    pal_tissue_compliance *tissue = self;
+    for (int k = 0; k < PAL_TISSUE_ANSWERS; k++) tissue->answer[k].size2 = 0;
+}
+
+/* the diagonal's inverse for the present topology: of the components' row sums where the body adapts, else 1 */
 static void find_diagonal(pal_tissue_compliance *tissue)
 {
-    const pal_step *step = tissue->step;
+    const pal_step *step = &tissue->step;
     const pal_body *body = step->body;
-    if (tissue->known && tissue->revision == body->display.revision) return;
+    if (tissue->preconditioned || (tissue->known && tissue->revision == body->display.revision)) return;
     memset(tissue->bound, 0, sizeof(double) * (size_t)body->n_node);
-    if (!body->interpolation) pal_guard_add_bounds(step->force, step->n_force, body, tissue->bound, tissue->low);
+    if (body->active) pal_guard_add_bounds(step->force, step->n_force, body, tissue->bound, tissue->low);
     for (int i = 0; i < body->n_dof; i++)
-        tissue->inverse[i] = !body->interpolation && tissue->bound[i] > 0 ? 1 / tissue->bound[i] : 1;
+        tissue->inverse[i] = body->active && tissue->bound[i] > 0 ? 1 / tissue->bound[i] : 1;
     tissue->known = true;
     tissue->revision = body->display.revision;
-    pal_tissue_compliance_reset(tissue);
+    reset(tissue);
+}
+
+/* z of the residual */
+static void precondition(pal_tissue_compliance *tissue, const double *r)
+{
+    const pal_body *body = tissue->step.body;
+    if (tissue->preconditioned) pal_rest_preconditioner_solve(&tissue->preconditioner, r, tissue->z);
+    for (int k = 0; k < body->n_active && !tissue->preconditioned; k++) {
+        const int i = pal_body_point(body, k);
+        pal_scale3(tissue->z + 3 * (size_t)i, tissue->inverse[i], r + 3 * (size_t)i);
+    }
 }
 
 /* one iteration; false: it cannot go on */
 static bool iterate(pal_tissue_compliance *tissue, pal_tissue_answer *a)
 {
-    const pal_body *body = tissue->step->body;
+    const pal_body *body = tissue->step.body;
     double fall2 = 0, change2 = 0;
+    precondition(tissue, a->left);
     for (int k = 0; k < body->n_active; k++) {
-        const int i = pal_body_point(body, k);
-        for (size_t c = 3 * (size_t)i; c < 3 * (size_t)i + 3; c++) {
-            const double z = tissue->inverse[i] * a->left[c];
-            fall2 += z * a->left[c];
-            change2 += (z - a->before[c]) * a->left[c];
-            a->before[c] = z;
+        const size_t i = 3 * (size_t)pal_body_point(body, k);
+        for (size_t c = i; c < i + 3; c++) {
+            fall2 += tissue->z[c] * a->left[c];
+            change2 += (tissue->z[c] - a->before[c]) * a->left[c];
+            a->before[c] = tissue->z[c];
         }
     }
     const double beta = a->fall2 > 0 ? fmax(0, change2 / a->fall2) : 0;
@@ -110,10 +127,17 @@ static bool iterate(pal_tissue_compliance *tissue, pal_tissue_answer *a)
     return true;
 }
 
+static void clear(pal_tissue_answer *a, const pal_body *body)
+{
+    const size_t n = 3 * sizeof(double) * (size_t)body->n_dof;
+    memset(a->move, 0, n), memset(a->direction, 0, n), memset(a->before, 0, n);
+    a->fall2 = 0;
+}
+
 /* the answer to the load most like r, or the one unused for longest, emptied */
 static pal_tissue_answer *find_answer(pal_tissue_compliance *tissue, const double *r, double size2)
 {
-    const pal_body *body = tissue->step->body;
+    const pal_body *body = tissue->step.body;
     pal_tissue_answer *best = NULL, *oldest = &tissue->answer[0];
     double nearest = PAL_SAME_COSINE;
     for (int k = 0; k < PAL_TISSUE_ANSWERS; k++) {
@@ -122,17 +146,14 @@ static pal_tissue_answer *find_answer(pal_tissue_compliance *tissue, const doubl
         const double cosine = a->size2 > 0 ? dot(body, a->force, r) / sqrt(a->size2 * size2) : 0;
         if (cosine > nearest) nearest = cosine, best = a;
     }
-    if (best) return best;
-    const size_t n = 3 * sizeof(double) * (size_t)body->n_dof;
-    memset(oldest->move, 0, n), memset(oldest->direction, 0, n), memset(oldest->before, 0, n);
-    oldest->fall2 = 0;
-    return oldest;
+    if (!best) clear(oldest, body);
+    return best ? best : oldest;
 }
 
 /* the answer for the load in product, continued; false: not known yet */
 static bool continue_answer(pal_tissue_compliance *tissue, pal_tissue_answer **out)
 {
-    pal_body *body = tissue->step->body;
+    pal_body *body = tissue->step.body;
     for (int i = 0; i < body->n_dof; i++)
         if (body->support[i]) pal_set3(tissue->product + 3 * (size_t)i, 0, 0, 0);
     const double size2 = dot(body, tissue->product, tissue->product);
@@ -143,17 +164,23 @@ static bool continue_answer(pal_tissue_compliance *tissue, pal_tissue_answer **o
     a->used = ++tissue->n_call;
     bool good = multiply(tissue, a->move);
     for (int i = 0; i < 3 * body->n_dof; i++) a->left[i] = a->force[i] - tissue->product[i];
-    while (good && tissue->credit >= 1 && dot(body, a->left, a->left) > ANSWER_SHARE * ANSWER_SHARE * size2)
+    /* u K u / 2 - f u, which is 0 of no answer and falls in every iteration */
+    if (!(dot(body, a->move, a->force) + dot(body, a->move, a->left) >= 0)) {
+        clear(a, body);
+        memcpy(a->left, a->force, 3 * sizeof(double) * (size_t)body->n_dof);
+    }
+    while (good && tissue->credit >= 1 &&
+           dot(body, a->left, a->left) > PAL_SOLVER_TOLERANCE * PAL_SOLVER_TOLERANCE * size2)
         good = iterate(tissue, a);
     const double left2 = dot(body, a->left, a->left);
     if (!isfinite(left2)) a->size2 = 0;
-    return left2 <= ANSWER_SHARE * ANSWER_SHARE * size2;
+    return left2 <= PAL_SOLVER_TOLERANCE * PAL_SOLVER_TOLERANCE * size2;
 }
 
 static bool solve(void *self, const pal_body *body, const double *force_N, double *move_m)
 {
     pal_tissue_compliance *tissue = self;
-    pal_body *own = tissue->step->body;
+    pal_body *own = tissue->step.body;
     pal_tissue_answer *a = NULL;
     find_diagonal(tissue);
     memcpy(tissue->x, own->x, 3 * sizeof(double) * (size_t)own->n_dof);
@@ -173,27 +200,53 @@ static bool solve(void *self, const pal_body *body, const double *force_N, doubl
     return true;
 }
 
-void pal_tissue_compliance_begin(pal_tissue_compliance *tissue, pal_step *step)
+static void begin(void *self, pal_step *step)
 {
-    tissue->step = step;
-    tissue->credit = fmin(tissue->credit + ITERATIONS_1_S * step->dt_s * step->n_sub, 2 * ITERATIONS_1_S * FRAME_S);
+    pal_tissue_compliance *tissue = self;
+    const double since_s = step->time_s > tissue->time_s ? step->time_s - tissue->time_s : 0;
+    tissue->step = *step;
+    tissue->time_s = step->time_s;
+    /* what was not used in a step is not saved up */
+    if (since_s > 0) tissue->credit = fmin(tissue->credit, 0) + PAL_TISSUE_PRODUCTS_1_S * step->dt_s * step->n_sub;
 }
 
-void pal_tissue_compliance_reset(pal_tissue_compliance *tissue)
+static void destroy(void *self)
 {
-    for (int k = 0; k < PAL_TISSUE_ANSWERS; k++) tissue->answer[k].size2 = 0;
+    pal_rest_preconditioner_destroy(&((pal_tissue_compliance *)self)->preconditioner);
 }
 
-pal_err pal_tissue_compliance_make(const pal_body *body, pal_arena *arena, pal_tissue_compliance *out)
+/* for a body whose nodes are its dofs and stay */
+static pal_err make_preconditioner(pal_tissue_compliance *tissue, const pal_system *system, pal_arena *arena)
 {
+    const pal_body *body = system->body;
+    PAL_TRY(pal_rest_stiffness_find(system, arena, &tissue->rest));
+    return pal_rest_preconditioner_make(body, &tissue->rest, body->support, arena, &tissue->preconditioner);
+}
+
+pal_err pal_tissue_compliance_make(const pal_build *build)
+{
+    pal_body *body = build->body;
+    pal_arena *arena = build->body_arena ? build->body_arena : build->arena;
     const size_t n = (size_t)body->n_dof;
-    memset(out, 0, sizeof *out);
-    bool made = PAL_NEW_DOUBLES(arena, 3 * n, &out->x, &out->low, &out->product) &&
-                PAL_NEW_DOUBLES(arena, n, &out->inverse) && PAL_NEW_DOUBLES(arena, (size_t)body->n_node, &out->bound);
+    pal_tissue_compliance *tissue = PAL_NEW(arena, pal_tissue_compliance, 1);
+    pal_system system;
+    if (!tissue) return PAL_ERR_MEMORY;
+    bool made = PAL_NEW_DOUBLES(arena, 3 * n, &tissue->x, &tissue->low, &tissue->product, &tissue->z) &&
+                PAL_NEW_DOUBLES(arena, n, &tissue->inverse) &&
+                PAL_NEW_DOUBLES(arena, (size_t)body->n_node, &tissue->bound);
     for (int k = 0; k < PAL_TISSUE_ANSWERS && made; k++) {
-        pal_tissue_answer *a = &out->answer[k];
+        pal_tissue_answer *a = &tissue->answer[k];
         made = PAL_NEW_DOUBLES(arena, 3 * n, &a->force, &a->move, &a->left, &a->direction, &a->before);
     }
-    out->hook = (pal_compliance){.self = out, .solve = solve};
-    return made ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    if (!made) return PAL_ERR_MEMORY;
+    if (!body->interpolation && !body->active) {
+        PAL_TRY(pal_system_make(build, &system));
+        pal_err err = make_preconditioner(tissue, &system, arena);
+        if (err == PAL_ERR_MEMORY) pal_rest_preconditioner_destroy(&tissue->preconditioner);
+        if (err == PAL_ERR_MEMORY) return err;
+        tissue->preconditioned = err == PAL_ERR_OK;
+    }
+    tissue->hook = (pal_compliance){.self = tissue, .solve = solve, .begin = begin, .reset = reset, .destroy = destroy};
+    body->compliance = &tissue->hook;
+    return PAL_ERR_OK;
 }
