@@ -310,7 +310,7 @@ static void put_haptic(pal_stream *s, int i, uint64_t now_ns, const pal_stream_t
         w.origin_m[c] = f->pose.position_m[c];
         x0[c] = f->has_grasp ? f->grasp_x0_m[c] - w.origin_m[c] : 0;
     }
-    copy_f3(w.f_ref_N, f->force_N);
+    copy_f3(w.f_ref_N, f->end_force_N);
     copy_f3(w.torque_ref_Nm, f->torque_Nm);
     copy_f3(w.grasp_arm_m, f->grasp_arm_m);
     copy_f3(w.grasp_x0_m, x0);
@@ -329,7 +329,7 @@ static void compare_force(pal_stream *s, int i, const pal_stream_tool *tool, dou
 {
     const pal_frame_tool *f = &s->frame->tool[i];
     const bool known = f->present && tool->holder && f->pose.commands_force;
-    const double far_N = known ? pal_dist3(f->pose.force_N, f->force_N) : 0;
+    const double far_N = known ? pal_dist3(f->pose.force_N, f->end_force_N) : 0;
     double *mean = &s->force_error2_N2[i];
     *mean = known ? *mean + (far_N * far_N - *mean) * -expm1(-dt_s / PAL_FORCE_ERROR_S) : 0;
 }

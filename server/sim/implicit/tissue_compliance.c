@@ -150,6 +150,18 @@ static pal_tissue_answer *find_answer(pal_tissue_compliance *tissue, const doubl
     return best ? best : oldest;
 }
 
+/* Is the answer good enough? With the preconditioner M near K the residual r has r' M^-1 r of the energy f' u left to
+ * gain, which is the relative error of the compliance; without one the residual itself has to be small */
+static bool is_good(pal_tissue_compliance *tissue, const pal_tissue_answer *a)
+{
+    const pal_body *body = tissue->step.body;
+    if (!tissue->preconditioned)
+        return dot(body, a->left, a->left) <= PAL_SOLVER_TOLERANCE * PAL_SOLVER_TOLERANCE * a->size2;
+    precondition(tissue, a->left);
+    const double gain = dot(body, a->left, tissue->z), has = dot(body, a->force, a->move);
+    return has > 0 && gain <= PAL_TISSUE_ERROR * has;
+}
+
 /* the answer for the load in product, continued; false: not known yet */
 static bool continue_answer(pal_tissue_compliance *tissue, pal_tissue_answer **out)
 {
@@ -169,12 +181,9 @@ static bool continue_answer(pal_tissue_compliance *tissue, pal_tissue_answer **o
         clear(a, body);
         memcpy(a->left, a->force, 3 * sizeof(double) * (size_t)body->n_dof);
     }
-    while (good && tissue->credit >= 1 &&
-           dot(body, a->left, a->left) > PAL_SOLVER_TOLERANCE * PAL_SOLVER_TOLERANCE * size2)
-        good = iterate(tissue, a);
-    const double left2 = dot(body, a->left, a->left);
-    if (!isfinite(left2)) a->size2 = 0;
-    return left2 <= PAL_SOLVER_TOLERANCE * PAL_SOLVER_TOLERANCE * size2;
+    while (good && tissue->credit >= 1 && !is_good(tissue, a)) good = iterate(tissue, a);
+    if (!isfinite(dot(body, a->left, a->left))) a->size2 = 0;
+    return a->size2 > 0 && is_good(tissue, a);
 }
 
 static bool solve(void *self, const pal_body *body, const double *force_N, double *move_m)

@@ -5,8 +5,8 @@
  *
  * A product costs two evaluations of forces, so few are made in a step (PAL_TISSUE_PRODUCTS_1_S), and the answer to a
  * load continues in the next one: residual and direction stay, the residual is found again as the body moves, and beta
- * is Polak and Ribiere's, which does not need K to be quite the same. An answer counts once its residual is below
- * PAL_SOLVER_TOLERANCE; until then there is none. One that is worse than no answer, as where K was found at a fold, is
+ * is Polak and Ribiere's, which does not need K to be quite the same. An answer counts once its error is below
+ * PAL_TISSUE_ERROR; until then there is none. One that is worse than no answer, as where K was found at a fold, is
  * forgotten. Built only where a CONTACT component asks for it, and not without supports. Thread: [load] to make, then
  * [sim]. */
 #ifndef PAL_SIM_IMPLICIT_TISSUE_COMPLIANCE_H

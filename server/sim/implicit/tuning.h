@@ -57,4 +57,7 @@ enum {
 /* products with the true stiffness a second for the static compliance of an explicit body: 4 in 1/60 s, 8 evaluations
  * of forces beside those of some 20 sub-steps (tests/sim/contact/test_haptic_models.c) */
 #define PAL_TISSUE_PRODUCTS_1_S 240
+/* relative error of its answers as the preconditioner sees it: at 1e-2 a stiffness is 10 % off the slope of the force
+ * (tests/sim/contact/test_haptic_models.c) */
+#define PAL_TISSUE_ERROR 2e-3
 #endif

@@ -74,6 +74,7 @@ static void copy_tool(const pal_world *w, int t, pal_frame_tool *to)
     to->pose = tool->last;
     to->pose_ns = w->pose_ns[t];
     pal_copy3(to->force_N, tool->mean_force_N);
+    pal_copy3(to->end_force_N, tool->force_N);
     pal_copy3(to->torque_Nm, tool->torque_Nm);
     to->radius_m = tool->radius_m;
     to->n_patch = tool->n_patch;
