@@ -130,7 +130,7 @@ typedef struct pal_wire_active {
 typedef struct pal_wire_device {
     uint32_t tool;
     double force_error_N; /* rms over the last second of its force less the server's at the same pose; 0: no forces */
-    double grip;          /* opening of its gripper, rad or m; 0 without */
+    double opening;       /* of its gripper, rad or m; 0 without */
 } pal_wire_device;
 
 /* a part that is frozen, asleep or was safeguarded; false, empty and 0 are not on the wire */

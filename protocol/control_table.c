@@ -69,7 +69,7 @@ static const pal_control_field state_fields[] = {{"part", U32, true, ONE(part_st
                                                  {0}};
 static const pal_control_field device_fields[] = {{"tool", U32, true, ONE(device, tool)},
                                                   {"force_error_N", F64, false, ONE(device, force_error_N)},
-                                                  {"grip", F64, false, ONE(device, grip)},
+                                                  {"opening", F64, false, ONE(device, opening)},
                                                   {0}};
 static const pal_control_field off_fields[] = {
     {"component", TEXT, true, ONE(disabled, component)}, {"part", U32, true, ONE(disabled, part)}, {0}};

@@ -158,7 +158,7 @@ static int pose(pal_client *c, const uint8_t *bytes, size_t n_byte)
                   .seq = w.seq,
                   .stamp_us = w.stamp_us,
                   .commands_force = w.flags & PAL_WIRE_POSE_FORCES_ON,
-                  .grip = w.grip};
+                  .opening = w.grip};
     for (int i = 0; i < 3; i++) {
         p.position_m[i] = w.position_m[i];
         p.velocity_m_s[i] = w.velocity_m_s[i];

@@ -339,8 +339,8 @@ int pal_stream_devices(const pal_stream *stream, const pal_stream_tool tool[PAL_
     int n = 0;
     for (int i = 0; stream->frame && i < stream->frame->n_tool; i++) {
         const pal_frame_tool *f = &stream->frame->tool[i];
-        if (!f->present || !tool[i].holder || !(f->pose.commands_force || f->pose.grip != 0)) continue;
-        device[n++] = (pal_wire_device){(uint32_t)i, sqrt(stream->force_error2_N2[i]), f->pose.grip};
+        if (!f->present || !tool[i].holder || !(f->pose.commands_force || f->pose.opening != 0)) continue;
+        device[n++] = (pal_wire_device){(uint32_t)i, sqrt(stream->force_error2_N2[i]), f->pose.opening};
     }
     return n;
 }

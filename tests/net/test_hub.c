@@ -300,10 +300,10 @@ static void force_of_a_device_is_compared_with_the_servers(void)
             turn(&a, NULL);
         }
         const pal_wire_device *device = &status->device[0];
-        printf("  %u devices, force off by %.3g N rms, grip %.3g\n", status->n_device, device->force_error_N,
-               device->grip);
+        printf("  %u devices, force off by %.3g N rms, opening %.3g\n", status->n_device, device->force_error_N,
+               device->opening);
         CHECK_INT(status->n_device, part < 2);
-        if (part < 2) CHECK_NEAR(device->grip, 0.25, 1e-6);
+        if (part < 2) CHECK_NEAR(device->opening, 0.25, 1e-6);
         /* after 2.5 to 3 s, as status comes twice a second: 1 - exp(-2.5) of the mean */
         if (part == 0) CHECK(device->force_error_N > 5 * sqrt(1 - exp(-2.4)) && device->force_error_N <= 5);
         if (part == 1) CHECK(device->force_error_N > 0 && device->force_error_N < 5 * sqrt(exp(-2.4)));

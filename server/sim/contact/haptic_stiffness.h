@@ -1,4 +1,4 @@
-/* The stiffness that a haptic bridge renders. Where the solver knows the static compliance W (pal_body.compliance):
+/* The stiffness that a haptic bridge renders, by the static compliance W (pal_body.compliance):
  *     contact        k = s' (1/k_c + J W J')^-1 s,  contacts J of stiffness k_c that move by s for each metre of tool
  *     across it      k_t = 2 / (a + b),             a = 1/k_c + t' W t of two directions t, where there is friction
  *     near contact   k = 1 / (1/k_c + n' W n),      an even pressure on the points that the tool would lie on
@@ -6,7 +6,7 @@
  * W is the static compliance, because an implicit step is stiffer than tissue by its mass over dt^2. An answer costs as
  * much as some steps, so answers are kept, one for each direction of contact, until tool or force have changed.
  *
- * Elsewhere the slope of force over displacement by least squares (pal_stiffness_fit),
+ * Until W is known the slope of force over displacement by least squares (pal_stiffness_fit),
  *     k = (cov(x, f) + p^2 k_start) / (var(x) + p^2),   p = L/10,  L = SHALLOW_RADII of a tool,
  * with means over the path of the tool, on which samples farther back than L count less and less. A tool at rest keeps
  * its stiffness, and the estimate does not depend on the number of steps. Thread: [sim]. */

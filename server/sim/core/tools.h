@@ -19,7 +19,7 @@ typedef struct pal_pose {
     uint64_t stamp_us;      /* client's clock, echoed */
     /* of the device, for status only: what it commanded at this pose, and the opening of its gripper, rad or m */
     bool commands_force;
-    double force_N[3], grip;
+    double force_N[3], opening;
 } pal_pose;
 
 /* Contact model for a haptic bridge, linearised at the tool: the plane of zero force in the configuration space of the

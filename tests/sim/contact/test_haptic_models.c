@@ -1,4 +1,4 @@
-/* What a haptic bridge is told, against the server's own force, for every model: springs and adaptive surfaces and
+/* What a haptic bridge is published, against the server's own force, for every model: springs and adaptive surfaces and
  * subdivision solids by explicit solvers, finite elements by an implicit one. Finite differences are over poses that
  * the tissue was left to settle at. */
 #include "server/base/vec3.h"
@@ -114,17 +114,17 @@ static void a_resting_hand_has_a_steady_model_of_the_right_stiffness(void)
             REQUIRE(force_at(&m, at, 0, 0, half_m, false, less) && force_at(&m, at, 0, 0, -half_m, false, more));
             /* along z the plane is as far away as 1 / n_z, and its force has n_z of itself */
             const double slope = (more[2] - less[2]) / (2 * half_m),
-                         told = patch.k1_N_m * patch.normal[2] * patch.normal[2];
+                         published = patch.k1_N_m * patch.normal[2] * patch.normal[2];
             printf("  %-16s %d mm: k1 %.4g, slope %.4g N/m (%+.1f %%); still %.2g %%, %.2g mm; trembling %.2g %%, "
                    "%.2g mm; F/k1d - 1 %.2g\n",
-                   model_kind_name[kind], 2 * k, told, slope, 100 * (told / slope - 1), 100 * still.k,
+                   model_kind_name[kind], 2 * k, published, slope, 100 * (published / slope - 1), 100 * still.k,
                    1e3 * still.plane_m, 100 * trembling.k, 1e3 * trembling.plane_m, still.force);
             CHECK_LE(still.k, 0.05);
             CHECK_LE(still.plane_m, 1e-4);
             CHECK_LE(trembling.k, 0.05);
             CHECK_LE(trembling.plane_m, 1e-4);
             CHECK_LE(still.force, 1e-6);
-            CHECK_NEAR(told, slope, (kind == SHELL ? 0.12 : 0.06) * slope);
+            CHECK_NEAR(published, slope, (kind == SHELL ? 0.12 : 0.06) * slope);
         }
         model_scene_close(&m);
     }
