@@ -126,6 +126,13 @@ typedef struct pal_wire_active {
     uint32_t n_finest_node, n_finest_spring; /* if every region had its finest level */
 } pal_wire_active;
 
+/* a tool whose device commands forces or has a gripper, as the server sees it */
+typedef struct pal_wire_device {
+    uint32_t tool;
+    double force_error_N; /* rms over the last second of its force less the server's at the same pose; 0: no forces */
+    double opening;       /* of its gripper, rad or m; 0 without */
+} pal_wire_device;
+
 /* a part that is frozen, asleep or was safeguarded; false, empty and 0 are not on the wire */
 typedef struct pal_wire_part_state {
     uint32_t part;
@@ -169,6 +176,8 @@ typedef struct pal_wire_status {
     uint32_t n_disabled;
     pal_wire_disabled disabled[PAL_WIRE_COMPONENT_MAX];
     uint64_t n_unobserved; /* steps without observers     */
+    uint32_t n_device;     /* 0: not on the wire          */
+    pal_wire_device device[PAL_WIRE_TOOL_MAX];
 } pal_wire_status;
 
 typedef struct pal_wire_member {

@@ -67,6 +67,10 @@ static const pal_control_field state_fields[] = {{"part", U32, true, ONE(part_st
                                                  {"safeguards", U64, false, ONE(part_state, n_safeguard)},
                                                  {"safeguard_ms", F64, false, ONE(part_state, safeguard_ms)},
                                                  {0}};
+static const pal_control_field device_fields[] = {{"tool", U32, true, ONE(device, tool)},
+                                                  {"force_error_N", F64, false, ONE(device, force_error_N)},
+                                                  {"opening", F64, false, ONE(device, opening)},
+                                                  {0}};
 static const pal_control_field off_fields[] = {
     {"component", TEXT, true, ONE(disabled, component)}, {"part", U32, true, ONE(disabled, part)}, {0}};
 static const pal_control_field STATUS_fields[] = {
@@ -92,6 +96,7 @@ static const pal_control_field STATUS_fields[] = {
     {"parts", OBJECTS, false, LIST(status, state, n_state), state_fields},
     {"disabled", OBJECTS, false, LIST(status, disabled, n_disabled), off_fields},
     {"unobserved_steps", U64, false, ONE(status, n_unobserved)},
+    {"devices", OBJECTS, false, LIST(status, device, n_device), device_fields},
     {0}};
 static const pal_control_field member_fields[] = {
     {"id", U16, true, ONE(member, id)},         {"role", ROLE, true, ONE(member, role)},

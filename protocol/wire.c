@@ -44,10 +44,12 @@ static const field tool_fields[] = {{TOOL(U16, holder)},
                                     {TOOL(U64, echo_stamp_us)},
                                     {0}};
 static const field haptic_fields[] = {
-    {MODEL(U32, seq)},        {MODEL(U32, flags)},       {MODEL(U64, stamp_us)},      {MODEL(U64, echo_stamp_us)},
-    {MODEL(U32, echo_seq)},   {MODEL(U32, hold_us)},     {MODEL(U32, frame_us)},      {MODEL(U32, n_patch)},
-    {MODEL(F64, origin_m)},   {MODEL(F32, f_ref_N)},     {MODEL(U32, has_grasp)},     {MODEL(F32, grasp_x0_m)},
-    {MODEL(F32, grasp_f0_N)}, {MODEL(F32, grasp_k_N_m)}, {MODEL(F32, grasp_b_N_s_m)}, {0}};
+    {MODEL(U32, seq)},           {MODEL(U32, flags)},         {MODEL(U64, stamp_us)},
+    {MODEL(U64, echo_stamp_us)}, {MODEL(U32, echo_seq)},      {MODEL(U32, hold_us)},
+    {MODEL(U32, frame_us)},      {MODEL(U32, n_patch)},       {MODEL(F64, origin_m)},
+    {MODEL(F32, f_ref_N)},       {MODEL(F32, torque_ref_Nm)}, {MODEL(U32, has_grasp)},
+    {MODEL(F32, grasp_x0_m)},    {MODEL(F32, grasp_f0_N)},    {MODEL(F32, grasp_k_N_m)},
+    {MODEL(F32, grasp_b_N_s_m)}, {MODEL(F32, grasp_arm_m)},   {0}};
 static const field patch_fields[] = {{PATCH(U16, id)},
                                      {PATCH(U16, group)},
                                      {PATCH(F32, p_m)},

@@ -23,7 +23,7 @@
 #define PAL_WIRE_POSE_BYTES            152
 #define PAL_WIRE_ACK_BYTES             16
 #define PAL_WIRE_TOOLS_BYTES(n_tool)   (24u + 68u * (n_tool))
-#define PAL_WIRE_HAPTIC_BYTES(n_patch) (140u + 68u * (n_patch))
+#define PAL_WIRE_HAPTIC_BYTES(n_patch) (164u + 68u * (n_patch))
 #define PAL_WIRE_TOOLS_MAX             PAL_WIRE_TOOLS_BYTES(PAL_WIRE_TOOL_MAX)
 #define PAL_WIRE_HAPTIC_MAX            PAL_WIRE_HAPTIC_BYTES(PAL_WIRE_CONTACT_PATCH_MAX)
 
@@ -168,11 +168,13 @@ typedef struct pal_wire_haptic {
     uint32_t frame_us; /* usual distance of two models                   */
     uint32_t n_patch;
     double origin_m[3];
-    float f_ref_N[3];   /* force of the simulation on the tool, for display and checks; never rendered */
-    uint32_t has_grasp; /* 1: grasp_* hold a bilateral spring */
+    float f_ref_N[3];       /* force of the simulation on the tool, for display and checks; never rendered */
+    float torque_ref_Nm[3]; /* the same about its centre */
+    uint32_t has_grasp;     /* 1: grasp_* hold a bilateral spring */
     float grasp_x0_m[3], grasp_f0_N[3];
     float grasp_k_N_m[6]; /* xx xy xz yy yz zz                              */
     float grasp_b_N_s_m;
+    float grasp_arm_m[3]; /* from the tool's centre to where its force acts, turned with the tool */
     pal_wire_contact_patch patch[PAL_WIRE_CONTACT_PATCH_MAX];
 } pal_wire_haptic;
 size_t pal_wire_put_haptic(uint8_t *dst, size_t cap, const pal_wire_haptic *h);

@@ -1,10 +1,10 @@
 #include "clients/haptic_bridge/servo.h"
-#include "clients/haptic_bridge/energy_gate.h"
-#include "clients/haptic_bridge/local_contact.h"
 #include "clients/haptic_bridge/tuning.h"
 #include "server/base/command_queue.h"
 #include "server/base/triple_buffer.h"
 #include "server/base/vec3.h"
+#include "server/rendering/energy_gate.h"
+#include "server/rendering/local_contact.h"
 
 #include <stdatomic.h>
 #include <stdlib.h>

@@ -26,11 +26,11 @@
 #ifndef PAL_HAPTIC_BRIDGE_SERVO_H
 #define PAL_HAPTIC_BRIDGE_SERVO_H
 #include "clients/haptic_bridge/device.h"
-#include "clients/haptic_bridge/local_model.h"
 #include "clients/haptic_bridge/workspace.h"
 #include "protocol/wire.h"
 #include "server/base/clock.h"
 #include "server/base/err.h"
+#include "server/rendering/local_model.h"
 
 #include <stdbool.h>
 

@@ -47,6 +47,8 @@
     X(has_grasp, has_grasp)                                                                                            \
     X(grasp_b_N_s_m, grasp_b)                                                                                          \
     Y(origin_m, origin)                                                                                                \
+    Y(torque_ref_Nm, torque_ref)                                                                                       \
+    Y(grasp_arm_m, grasp_arm)                                                                                          \
     Y(f_ref_N, f_ref)                                                                                                  \
     Y(grasp_x0_m, grasp_x0)                                                                                            \
     Y(grasp_f0_N, grasp_f0)                                                                                            \

@@ -86,6 +86,7 @@ static pal_packet *status_message(pal_client *c)
                 w->active[w->n_active++] =
                     (pal_wire_active){(uint32_t)p, (uint32_t)f->part[p].n_active, (uint32_t)f->part[p].n_spring,
                                       (uint32_t)f->part[p].n_finest, (uint32_t)f->part[p].n_finest_spring};
+        w->n_device = (uint32_t)pal_stream_devices(s, c->room->tool, w->device);
         w->n_late = f->n_late;
         w->n_refused = f->n_refused;
     }

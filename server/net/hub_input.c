@@ -154,10 +154,15 @@ static int pose(pal_client *c, const uint8_t *bytes, size_t n_byte)
         }
         return 0;
     }
-    pal_pose p = {.buttons = w.buttons & PAL_WIRE_GRASP, .seq = w.seq, .stamp_us = w.stamp_us};
+    pal_pose p = {.buttons = w.buttons & PAL_WIRE_GRASP,
+                  .seq = w.seq,
+                  .stamp_us = w.stamp_us,
+                  .commands_force = w.flags & PAL_WIRE_POSE_FORCES_ON,
+                  .opening = w.grip};
     for (int i = 0; i < 3; i++) {
         p.position_m[i] = w.position_m[i];
         p.velocity_m_s[i] = w.velocity_m_s[i];
+        p.force_N[i] = w.force_N[i];
     }
     for (int i = 0; i < 4; i++) p.quat[i] = w.quaternion[i];
     /* a release is never refused */

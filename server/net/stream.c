@@ -5,6 +5,7 @@
 #include "protocol/field_codec.h"
 #include "server/base/clock.h"
 #include "server/base/log.h"
+#include "server/base/vec3.h"
 #include "server/net/transport/plain_text.h"
 #include "server/net/tuning.h"
 #include "server/session/tuning.h"
@@ -309,7 +310,9 @@ static void put_haptic(pal_stream *s, int i, uint64_t now_ns, const pal_stream_t
         w.origin_m[c] = f->pose.position_m[c];
         x0[c] = f->has_grasp ? f->grasp_x0_m[c] - w.origin_m[c] : 0;
     }
-    copy_f3(w.f_ref_N, f->force_N);
+    copy_f3(w.f_ref_N, f->end_force_N);
+    copy_f3(w.torque_ref_Nm, f->torque_Nm);
+    copy_f3(w.grasp_arm_m, f->grasp_arm_m);
     copy_f3(w.grasp_x0_m, x0);
     copy_f3(w.grasp_f0_N, f->grasp_f0_N);
     copy_f3(w.grasp_k_N_m, f->grasp_k_N_m);
@@ -320,12 +323,35 @@ static void put_haptic(pal_stream *s, int i, uint64_t now_ns, const pal_stream_t
     pal_packet_replace(&s->haptic[i], n ? pal_packet_create(s->buffer, n, false) : NULL);
 }
 
+/* A device commands its force at the pose that it sends, and the step that used this pose gives the server's there.
+ * dt_s: since the frame before */
+static void compare_force(pal_stream *s, int i, const pal_stream_tool *tool, double dt_s)
+{
+    const pal_frame_tool *f = &s->frame->tool[i];
+    const bool known = f->present && tool->holder && f->pose.commands_force;
+    const double far_N = known ? pal_dist3(f->pose.force_N, f->end_force_N) : 0;
+    double *mean = &s->force_error2_N2[i];
+    *mean = known ? *mean + (far_N * far_N - *mean) * -expm1(-dt_s / PAL_FORCE_ERROR_S) : 0;
+}
+
+int pal_stream_devices(const pal_stream *stream, const pal_stream_tool tool[PAL_TOOL_MAX], pal_wire_device *device)
+{
+    int n = 0;
+    for (int i = 0; stream->frame && i < stream->frame->n_tool; i++) {
+        const pal_frame_tool *f = &stream->frame->tool[i];
+        if (!f->present || !tool[i].holder || !(f->pose.commands_force || f->pose.opening != 0)) continue;
+        device[n++] = (pal_wire_device){(uint32_t)i, sqrt(stream->force_error2_N2[i]), f->pose.opening};
+    }
+    return n;
+}
+
 bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_STREAM_TIER_COUNT],
                        const pal_stream_tool tool[PAL_TOOL_MAX])
 {
     const pal_frame *frame = pal_session_take_frame(stream->session);
     if (!frame) return false;
     stream->frame = frame;
+    const double dt_s = stream->cycle > 0 && now_ns > stream->cycle_ns ? (double)(now_ns - stream->cycle_ns) * 1e-9 : 0;
     stream->cycle++;
     stream->cycle_ns = now_ns;
     for (int p = 0; p < stream->n_part; p++) {
@@ -336,7 +362,10 @@ bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_
             if (used[t]) encode_part(stream, p, t, false);
     }
     put_tools(stream, now_ns, tool);
-    for (int i = 0; i < frame->n_tool; i++) put_haptic(stream, i, now_ns, &tool[i]);
+    for (int i = 0; i < frame->n_tool; i++) {
+        compare_force(stream, i, &tool[i], dt_s);
+        put_haptic(stream, i, now_ns, &tool[i]);
+    }
     /* components have changed, so the entries have other meanings */
     if (frame->n_row != stream->n_component) memset(stream->component_ms, 0, sizeof stream->component_ms);
     stream->n_component = frame->n_row;

@@ -58,6 +58,7 @@ typedef struct pal_stream {
     uint32_t seq[PAL_BODY_MAX]; /* of the last frame, per part, across all tiers */
     uint8_t *buffer;            /* [cap] */
     size_t cap;
+    double force_error2_N2[PAL_TOOL_MAX]; /* mean square of a device's force less the server's, of a second */
     uint32_t haptic_seq;
     uint64_t field_seq;
     uint64_t rate_tick, rate_ns;
@@ -80,6 +81,8 @@ typedef struct pal_stream_tool {
     uint64_t taken_ns; /* when the holder took it; older poses are not echoed */
 } pal_stream_tool;
 
+/* what the server knows of the devices of held tools; device [PAL_TOOL_MAX], returns how many */
+int pal_stream_devices(const pal_stream *stream, const pal_stream_tool tool[PAL_TOOL_MAX], pal_wire_device *device);
 /* the 16-bit wire form of a member id, which grows without bound; 0 stays 0 */
 uint16_t pal_stream_wire_id(int member);
 /* Takes the session's newest frame and makes a cycle of it: encodes the tiers with used[] true, tools, and contact

@@ -25,6 +25,8 @@
 #define PAL_MESSAGES_1_S 600
 /* ns between two errors about poses to one client: a pose comes 250 times a second (test_hub) */
 #define PAL_POSE_ERROR_NS 1000000000u
+/* s over which the error of a device's force is a mean: some models, and a few messages of status (test_hub) */
+#define PAL_FORCE_ERROR_S 1.0
 /* ns that a closing server waits for its clients to take the reason (test_ws) */
 #define PAL_GOODBYE_NS 500000000u
 /* Hz, at most: cycles, which displays cannot show faster; values of a field, which are colours (test_hub) */

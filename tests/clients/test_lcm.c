@@ -70,7 +70,7 @@ static void encoded_sizes_are_those_of_the_design(void)
     CHECK_INT(encoded(palpate_tool_state_t_get_type_info(), &state, bytes, sizeof bytes), 156);
     for (int n = 0; n <= 8; n++) {
         const palpate_haptic_model_t model = a_model(patch, n);
-        CHECK_INT(encoded(palpate_haptic_model_t_get_type_info(), &model, bytes, sizeof bytes), 138 + 68 * n);
+        CHECK_INT(encoded(palpate_haptic_model_t_get_type_info(), &model, bytes, sizeof bytes), 162 + 68 * n);
     }
     /* a patch alone carries its own fingerprint of 8 bytes */
     CHECK_INT(encoded(palpate_contact_patch_t_get_type_info(), &patch[0], bytes, sizeof bytes), 8 + 68);
@@ -134,13 +134,13 @@ static void walk_refuses_lying_counts_and_strings(void)
     size_t n[8];
     const lcm_type_info_t *type[8];
     all_messages(bytes, n, type);
-    /* haptic_model: n_patch stands at 137 */
-    CHECK_INT(bytes[1][137], 4);
-    bytes[1][137] = 0x80;
+    /* haptic_model: n_patch stands at 161 */
+    CHECK_INT(bytes[1][161], 4);
+    bytes[1][161] = 0x80;
     CHECK_INT(pal_lcm_walk(type[1], bytes[1], n[1]), PAL_WALK_NUMBER);
-    bytes[1][137] = 5;
+    bytes[1][161] = 5;
     CHECK_INT(pal_lcm_walk(type[1], bytes[1], n[1]), PAL_WALK_SHORT);
-    bytes[1][137] = 3;
+    bytes[1][161] = 3;
     CHECK_INT(pal_lcm_walk(type[1], bytes[1], n[1]), PAL_WALK_LONG);
     /* body_frame: size stands before the payload of 100 */
     const size_t at = n[5] - 104;
@@ -274,7 +274,7 @@ static void haptic_model_survives_the_way_to_lcm_and_back(void)
     static pal_wire_haptic back;
     pal_lcm_from_haptic(&h, &model, patch);
     size_t n = encoded(palpate_haptic_model_t_get_type_info(), &model, bytes, sizeof bytes);
-    CHECK_INT(n, 138 + 3 * 68);
+    CHECK_INT(n, 162 + 3 * 68);
     CHECK_INT(pal_lcm_to_haptic(bytes, n, &back), PAL_ERR_OK);
     CHECK(memcmp(&h.patch, &back.patch, sizeof h.patch) == 0);
     CHECK_INT(back.seq, 11);

@@ -1,6 +1,6 @@
 /* The local contact model against its formulas (clients/haptic_bridge/README.md, "One tick"): normal force, friction,
  * grasp, torque, stored energy. */
-#include "clients/haptic_bridge/local_contact.h"
+#include "server/rendering/local_contact.h"
 #include "server/base/vec3.h"
 #include "tests/check.h"
 #include "tests/fixtures/random.h"

@@ -53,7 +53,7 @@ const right = {
     holder: member_with_tool,
     holders: member_with_tool,
     // of a stylus; the opening of a gripper, a field of LCM messages
-    grip: /^(protocol\/wire|clients\/(haptic_bridge\/(device|servo|bridge_net)|link\/lcm_convert)|tests\/(protocol\/|fakes\/|clients\/test_(lcm|device)))/,
+    grip: /^(protocol\/wire|server\/net\/hub_input|clients\/(haptic_bridge\/(device|servo|bridge_net)|link\/lcm_convert)|tests\/(protocol\/|net\/test_hub|fakes\/|clients\/test_(lcm|device)))/,
     most: /almost/i,
 };
 // words that are right in a sentence, which a name of five words or more is (tests are named so)

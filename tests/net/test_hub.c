@@ -277,6 +277,43 @@ static void pose_of_the_holder_moves_the_tool_and_is_echoed(void)
     end();
 }
 
+/* 5 N where the server has none, then none: the mean of the squares follows within seconds */
+static void force_of_a_device_is_compared_with_the_servers(void)
+{
+    mem_client a;
+    uint8_t bytes[PAL_WIRE_POSE_BYTES];
+    pal_wire_pose pose = {.flags = PAL_WIRE_POSE_FORCES_ON,
+                          .position_m = {0, 0, 0.3},
+                          .quaternion = {1, 0, 0, 0},
+                          .force_N = {3, 0, 4},
+                          .grip = 0.25f};
+    begin(true, 0);
+    mem_join(&a, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    UNTIL(a.n_text[PAL_CONTROL_STATUS] > 0, &a, NULL);
+    const pal_wire_status *status = &a.last[PAL_CONTROL_STATUS].status;
+    CHECK_INT(status->n_device, 0);
+    for (int part = 0; part < 3; part++) {
+        for (int i = 0; i < 180; i++) {
+            pose.seq++;
+            REQUIRE(pal_wire_put_pose(bytes, sizeof bytes, &pose) == sizeof bytes);
+            pal_mem_send(a.peer, bytes, sizeof bytes, false);
+            turn(&a, NULL);
+        }
+        const pal_wire_device *device = &status->device[0];
+        printf("  %u devices, force off by %.3g N rms, opening %.3g\n", status->n_device, device->force_error_N,
+               device->opening);
+        CHECK_INT(status->n_device, part < 2);
+        if (part < 2) CHECK_NEAR(device->opening, 0.25, 1e-6);
+        /* after 2.5 to 3 s, as status comes twice a second: 1 - exp(-2.5) of the mean */
+        if (part == 0) CHECK(device->force_error_N > 5 * sqrt(1 - exp(-2.4)) && device->force_error_N <= 5);
+        if (part == 1) CHECK(device->force_error_N > 0 && device->force_error_N < 5 * sqrt(exp(-2.4)));
+        if (part == 0) pose.force_N[0] = pose.force_N[2] = 0;
+        if (part == 1) pose.flags = 0, pose.grip = 0;
+    }
+    mem_end(&a);
+    end();
+}
+
 static void viewer_moves_no_tool_and_gives_no_command(void)
 {
     mem_client v, t;
@@ -585,6 +622,7 @@ int main(void)
     RUN(numbers_grow_through_every_change_of_tier);
     RUN(a_tool_has_one_holder);
     RUN(pose_of_the_holder_moves_the_tool_and_is_echoed);
+    RUN(force_of_a_device_is_compared_with_the_servers);
     RUN(viewer_moves_no_tool_and_gives_no_command);
     RUN(commands_are_checked_and_carried_out);
     RUN(hostile_messages_close_with_a_reason_and_nobody_else_notices);

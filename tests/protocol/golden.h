@@ -80,11 +80,13 @@ static inline pal_wire_haptic golden_haptic(void)
                          .n_patch = 2,
                          .origin_m = {0.123456789012345, -1e-9, 2},
                          .f_ref_N = {0.5f, -0.25f, 3},
+                         .torque_ref_Nm = {0.01f, -0.02f, 0.03f},
                          .has_grasp = 1,
                          .grasp_x0_m = {0.01f, 0.02f, 0.03f},
                          .grasp_f0_N = {1, 2, 3},
                          .grasp_k_N_m = {100, 1, 2, 110, 3, 120},
-                         .grasp_b_N_s_m = 1.5f};
+                         .grasp_b_N_s_m = 1.5f,
+                         .grasp_arm_m = {0.004f, -0.005f, 0.006f}};
     for (uint32_t i = 0; i < h.n_patch; i++) {
         float k = (float)(i + 1);
         h.patch[i] = (pal_wire_contact_patch){.id = (uint16_t)(1000 + i),

@@ -102,10 +102,12 @@ static void make_haptic(void)
             h.tool, h.seq, h.flags, (unsigned long long)h.stamp_us, (unsigned long long)h.echo_stamp_us, h.echo_seq,
             h.hold_us, h.frame_us);
     doubles("origin", h.origin_m, 3, ",");
-    floats("fRef", h.f_ref_N, 3, ",\"grasp\":{");
+    floats("fRef", h.f_ref_N, 3, ",");
+    floats("torqueRef", h.torque_ref_Nm, 3, ",\"grasp\":{");
     floats("x0", h.grasp_x0_m, 3, ",");
     floats("f0", h.grasp_f0_N, 3, ",");
     floats("k", h.grasp_k_N_m, 6, ",");
+    floats("arm", h.grasp_arm_m, 3, ",");
     fprintf(expected, "\"b\":%.9g},\"contact_patches\":[\n", (double)h.grasp_b_N_s_m);
     for (uint32_t i = 0; i < h.n_patch; i++) {
         const pal_wire_contact_patch *p = &h.patch[i];

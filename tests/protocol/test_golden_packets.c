@@ -121,6 +121,8 @@ static void haptic_model_is_read_and_written_as_committed(void)
     CHECK_NEAR((double)h.echo_stamp_us, number(e, "echoStampUs"), 0);
     CHECK_NEAR(h.frame_us, number(e, "frameUs"), 0);
     for (int c = 0; c < 3; c++) CHECK_NEAR(h.origin_m[c], element(e, "origin", c), 0);
+    for (int c = 0; c < 3; c++) CHECK_NEAR((double)h.torque_ref_Nm[c], element(e, "torqueRef", c), 1e-8);
+    for (int c = 0; c < 3; c++) CHECK_NEAR((double)h.grasp_arm_m[c], element(grasp, "arm", c), 1e-8);
     for (int c = 0; c < 6; c++) CHECK_NEAR((double)h.grasp_k_N_m[c], element(grasp, "k", c), 1e-6);
     CHECK_NEAR((double)h.grasp_b_N_s_m, number(grasp, "b"), 1e-8);
     for (int i = 0; i < (int)h.n_patch; i++) {

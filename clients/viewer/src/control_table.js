@@ -81,6 +81,7 @@ export const SERVER_MESSAGES = Object.freeze(
             ],
             "disabled?": [{ component: "text", part: "u32" }],
             "unobserved_steps?": "u64",
+            "devices?": [{ tool: "u32", "force_error_N?": "f64", "opening?": "f64" }],
         },
         members: { members: [member] },
         error: { code: "text", text: "text" },

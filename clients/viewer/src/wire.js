@@ -194,7 +194,8 @@ export function readTools(bytes) {
  *   kt: number, muS: number, muD: number, radius: number}} ContactPatch
  * @typedef {{tool: number, seq: number, flags: number, stampUs: number, echoStampUs: number, echoSeq: number,
  *   holdUs: number, frameUs: number, origin: number[], fRef: number[],
- *   grasp: {x0: number[], f0: number[], k: number[], b: number} | null, contactPatches: ContactPatch[]}} Haptic
+ *   torqueRef: number[],
+ *   grasp: {x0: number[], f0: number[], k: number[], b: number, arm: number[]} | null, contactPatches: ContactPatch[]}} Haptic
  */
 
 /** @param {Reader} r @returns {ContactPatch} */
@@ -217,7 +218,7 @@ function readContactPatch(r) {
  */
 export function readHaptic(bytes) {
     const tool = indexOf(bytes, KIND.HAPTIC);
-    need(bytes.length >= 140, "SHORT", `${bytes.length} bytes of 140`);
+    need(bytes.length >= 164, "SHORT", `${bytes.length} bytes of 164`);
     const r = new Reader(bytes, 8);
     const seq = r.u32();
     const flags = r.u32();
@@ -228,11 +229,12 @@ export function readHaptic(bytes) {
     const frameUs = r.u32();
     const nPatch = r.u32();
     need(nPatch <= CONTACT_PATCH_MAX, "COUNT", `${nPatch} patches`);
-    exactly(bytes, 140 + 68 * nPatch);
+    exactly(bytes, 164 + 68 * nPatch);
     const origin = r.doubles(3);
     const fRef = r.floats(3);
+    const torqueRef = r.floats(3);
     const hasGrasp = r.u32();
-    const grasp = { x0: r.floats(3), f0: r.floats(3), k: r.floats(6), b: r.f32() };
+    const grasp = { x0: r.floats(3), f0: r.floats(3), k: r.floats(6), b: r.f32(), arm: r.floats(3) };
     need(flags < 8, "FLAGS", `haptic flags ${flags}`);
     need(tool < TOOL_MAX && hasGrasp <= 1 && grasp.b >= 0, "RANGE", "tool or grasp");
     const contactPatches = Array.from({ length: nPatch }, () => readContactPatch(r));
@@ -247,6 +249,7 @@ export function readHaptic(bytes) {
         frameUs,
         origin,
         fRef,
+        torqueRef,
         grasp: hasGrasp ? grasp : null,
         contactPatches,
     };

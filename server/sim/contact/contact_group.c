@@ -4,6 +4,16 @@
 #include "server/base/vec3.h"
 #include "server/sim/contact/tuning.h"
 
+void pal_contact_group_across(const double n[3], double t[2][3])
+{
+    int axis = fabs(n[0]) < fabs(n[1]) ? 0 : 1;
+    if (fabs(n[2]) < fabs(n[axis])) axis = 2;
+    double e[3] = {axis == 0, axis == 1, axis == 2};
+    pal_cross3(t[0], n, e);
+    pal_unit3(t[0], t[0], 0);
+    pal_cross3(t[1], n, t[0]);
+}
+
 bool pal_contact_group_has(const double axis[3], const double direction[3])
 {
     return pal_dot3(direction, axis) >= GROUP_COSINE;
@@ -13,24 +23,24 @@ bool pal_contact_group_next(const pal_contact *contact, int n, uint8_t *grouped,
 {
     double axis[3], sum[3];
     int seed = -1;
-    double max2 = 0;
+    double max = 0;
     for (int i = 0; i < n; i++) {
-        double f2 = pal_dot3(contact[i].force, contact[i].force);
-        if (!grouped[i] && f2 > max2) max2 = f2, seed = i;
+        if (!grouped[i] && contact[i].normal_N > max) max = contact[i].normal_N, seed = i;
     }
     if (seed < 0) return false;
     pal_copy3(axis, contact[seed].away);
     for (int pass = 0; pass < 2; pass++) {
         pal_set3(sum, 0, 0, 0);
         for (int i = 0; i < n; i++)
-            if (!grouped[i] && pal_contact_group_has(axis, contact[i].away)) pal_add3(sum, sum, contact[i].force);
+            if (!grouped[i] && pal_contact_group_has(axis, contact[i].away))
+                pal_axpy3(sum, contact[i].normal_N, contact[i].away);
         if (pass == 0 && !pal_unit3(axis, sum, 0)) break;
     }
     for (int i = 0; i < n; i++)
         if (pal_contact_group_has(axis, contact[i].away)) grouped[i] = 1;
     grouped[seed] = 1;
     group->force_N = pal_norm3(sum);
-    group->gap_m = group->k_N_m = 0;
+    group->gap_m = group->k_N_m = group->sideways = 0;
     pal_scale3(sum, -1, sum);
     return pal_unit3(group->normal, sum, 0);
 }

@@ -7,11 +7,14 @@
 
 typedef struct pal_contact_group {
     double normal[3]; /* from tissue to tool, unit                                         */
-    double force_N;   /* normal force, 0 when only near                                    */
+    double force_N;   /* without friction, 0 when only near                                  */
     double gap_m;     /* distance the tool has to go until it touches, >= 0; 0 in contact  */
-    double k_N_m;     /* tangent stiffness by the solver's compliance; 0: not known        */
+    double k_N_m;     /* tangent stiffness by the compliance; 0: not known                 */
+    double sideways;  /* stiffness across over that along the normal; 0: not known         */
 } pal_contact_group;
 
+/* two unit directions across a unit direction */
+void pal_contact_group_across(const double n[3], double t[2][3]);
 /* true when a direction from the tool belongs to a group about `axis`, both unit */
 bool pal_contact_group_has(const double axis[3], const double direction[3]);
 /* the strongest contacts not yet grouped [n]; they are grouped then. False: there are none */

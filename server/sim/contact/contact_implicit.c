@@ -2,6 +2,7 @@
 #include "server/sim/contact/contact_implicit.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/contact/contact_group.h"
 #include "server/sim/contact/tuning.h"
 
 #include <string.h>
@@ -23,17 +24,6 @@ int pal_contact_implicit_thin(pal_contact *contact, int n)
         contact[m++].k_N_m *= stride[k];
     }
     return m;
-}
-
-/* two unit directions across n */
-static void basis(const double n[3], double t[2][3])
-{
-    int axis = fabs(n[0]) < fabs(n[1]) ? 0 : 1;
-    if (fabs(n[2]) < fabs(n[axis])) axis = 2;
-    double e[3] = {axis == 0, axis == 1, axis == 2};
-    pal_cross3(t[0], n, e);
-    pal_unit3(t[0], t[0], 0);
-    pal_cross3(t[1], n, t[0]);
 }
 
 /* adds s times the forces of n rows of the tool to the body's loads */
@@ -60,7 +50,7 @@ static void add_across(pal_contact_implicit *solve)
     pal_axpy3(stretch, -pal_dot3(stretch, along), along);
     double size = pal_norm3(stretch), limit_N = solve->friction * solve->normal_N;
     solve->slides = solve->slides && size > 0;
-    basis(along, solve->t);
+    pal_contact_group_across(along, solve->t);
     for (int k = 0; k < 2; k++) {
         if (pal_contact_springs_add_mean(solve->springs, contact, solve->share, n, solve->t[k],
                                          solve->slides ? 0 : stiffness) < 0)
@@ -190,6 +180,7 @@ static void sum_forces(pal_contact_implicit *solve, const double *force_N)
     for (int i = 0; i < n; i++) {
         double push_N = fmax(0, force_N[i]);
         pal_axpy3(solve->total_N, -force_N[i], contact[i].away);
+        contact[i].normal_N = push_N;
         pal_scale3(contact[i].force, push_N, contact[i].away);
         if (sum > 0) pal_axpy3(contact[i].force, push_N / sum, across);
     }

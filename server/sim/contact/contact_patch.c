@@ -2,6 +2,7 @@
 #include "server/sim/contact/contact_patch.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/contact/tuning.h"
 
 #include <string.h>
 
@@ -53,6 +54,11 @@ static void follow(pal_contact_patch_track *track, const pal_contact_patch_optio
         pal_stiffness_fit_add(&track->fit, (double[3]){track->depth_m}, (double[3]){group->force_N}, options->radius_m);
         track->fit.k_N_m = pal_haptic_stiffness_clamp(k > 0 ? k : track->fit.k_N_m);
     }
+    /* an estimate found again moves the plane by the depth times its change: a tool at rest follows it slowly, one that
+     * moves at once */
+    const double part = exp(-options->step_s / FOLLOW_S - pal_norm3(move) / (SHALLOW_RADII * options->radius_m));
+    if (touches != track->contact || !(track->k_N_m > 0)) track->k_N_m = track->fit.k_N_m;
+    track->k_N_m = part * track->k_N_m + (1 - part) * track->fit.k_N_m;
     track->contact = touches;
     pal_copy3(track->normal, group->normal);
 }
@@ -61,12 +67,13 @@ static void follow(pal_contact_patch_track *track, const pal_contact_patch_optio
 static pal_contact_patch patch_of(const pal_contact_patch_track *track, const pal_contact_patch_options *options,
                                   const pal_contact_group *group, const pal_tool *tool)
 {
-    double k = track->fit.k_N_m, height = group->force_N > 0 ? group->force_N / k : -group->gap_m;
+    double k = track->k_N_m, height = group->force_N > 0 ? group->force_N / k : -group->gap_m;
+    const double sideways = group->sideways > 0 ? group->sideways : options->sideways;
     pal_contact_patch patch = {.k1_N_m = k,
                                .id = track->id,
                                .group = track->id,
                                .b_Ns_m = options->b_s * k,
-                               .kt_N_m = options->friction > 0 ? options->sideways * k : 0,
+                               .kt_N_m = options->friction > 0 ? sideways * k : 0,
                                .mu_static = options->friction,
                                .mu_dynamic = options->friction,
                                .radius_m = options->radius_m};

@@ -8,11 +8,12 @@
 #include "server/sim/contact/haptic_stiffness.h"
 
 typedef struct pal_contact_patch_options {
+    double step_s; /* since the last update */
     double radius_m;
     double k_start_N_m; /* k1 before the first contact: that of a flat punch, 2 E a / (1 - nu^2)       */
     double b_s;         /* damping over stiffness, s                                                    */
     double friction;    /* coefficient, static and dynamic alike                                        */
-    double sideways;    /* tangential over normal stiffness, of a flat punch: 2 (1 - nu) / (2 - nu)     */
+    double sideways;    /* tangential over normal stiffness until it is known: of a flat punch, 2 (1 - nu) / (2 - nu) */
 } pal_contact_patch_options;
 
 typedef struct pal_contact_patch_track {
@@ -20,6 +21,7 @@ typedef struct pal_contact_patch_track {
     int16_t id;
     double normal[3], depth_m; /* as measured; depth below 0 is a gap */
     pal_stiffness_fit fit;     /* its start value is later what the last contact taught */
+    double k_N_m;              /* as published: follows the estimate as tool and time go on; 0: not yet */
 } pal_contact_patch_track;
 
 typedef struct pal_contact_patches {

@@ -41,7 +41,8 @@ typedef struct pal_contact {
     int32_t point;
     double away[3]; /* unit, from the tool's centre to it */
     double depth_m, k_N_m;
-    double force[3]; /* on the point */
+    double normal_N; /* force along `away` alone     */
+    double force[3]; /* on the point, with friction */
 } pal_contact;
 
 /* points, at most max_sample samples (spacing grows to keep to it); body must show something; MEMORY, REFUSED */

@@ -122,25 +122,26 @@ double pal_contact_springs_max_force_N(pal_contact_springs *springs, const doubl
 }
 
 /* out_i = p_i / k_i + J_i W sum p_j J_j' */
-static bool apply_compliance(pal_contact_springs *springs, const int32_t *rows, const double *p, int n, double *load,
-                             double *move, double *out)
+static bool apply_compliance(pal_contact_springs *springs, const pal_compliance *compliance, const int32_t *rows,
+                             const double *p, int n, double *load, double *move, double *out)
 {
     const pal_body *body = springs->body;
     memset(load, 0, 3 * sizeof(double) * (size_t)body->n_node);
     clear_state(springs);
     for (int i = 0; i < n; i++) row_load(springs, rows[i], p[i]);
     pal_contact_points_from_slots(springs->points, body, load);
-    if (!body->compliance->solve(body->compliance->self, body, load, move)) return false;
+    if (!compliance->solve(compliance->self, body, load, move)) return false;
     pal_contact_points_to_slots(springs->points, body, move);
     for (int i = 0; i < n; i++) out[i] = p[i] / springs->k_N_m[rows[i]] + row_motion(springs, rows[i]);
     return true;
 }
 
-double pal_contact_springs_stiffness(pal_contact_springs *springs, const int32_t *rows, const double *share, int n,
-                                     int passes, double *answer, pal_arena *scratch)
+double pal_contact_springs_stiffness(pal_contact_springs *springs, const pal_compliance *compliance,
+                                     const int32_t *rows, const double *share, int n, int passes, double *answer,
+                                     pal_arena *scratch)
 {
     const pal_body *body = springs->body;
-    if (!body->compliance || n <= 0) return 0;
+    if (!compliance || n <= 0) return 0;
     size_t used = pal_arena_used(scratch), n3 = 3 * (size_t)body->n_node;
     double *load, *move, *r, *p, *w, stiffness = 0, rz = 0;
     bool known = PAL_NEW_DOUBLES(scratch, n3, &load, &move) && PAL_NEW_DOUBLES(scratch, n, &r, &p, &w);
@@ -151,7 +152,7 @@ double pal_contact_springs_stiffness(pal_contact_springs *springs, const int32_t
         rz += r[i] * p[i];
     }
     for (int pass = 0; pass < passes && known && rz > 0; pass++) {
-        known = apply_compliance(springs, rows, p, n, load, move, w);
+        known = apply_compliance(springs, compliance, rows, p, n, load, move, w);
         double pw = 0, next = 0;
         for (int i = 0; i < n && known; i++) pw += p[i] * w[i];
         if (!known || !(pw > 0)) break;

@@ -48,9 +48,10 @@ void pal_contact_springs_load(pal_contact_springs *springs, double s, const doub
 double pal_contact_springs_max_force_N(pal_contact_springs *springs, const double *force_N, int first, int n);
 
 /* Tangent stiffness that a tool feels which moves rows[i] by share[i] for each metre it goes itself, the tissue behind
- * them answering statically: share' (1/k + J W J')^-1 share,  W = body->compliance.
+ * them answering statically: share' (1/k + J W J')^-1 share,  W of `compliance`.
  * `passes` steps of conjugate gradients with k as preconditioner, one solve with the factor each. answer [n_node][3],
  * may be NULL: displacement of tissue for each metre. 0: not known. scratch: 2 [n_node][3] and 4 [n] */
-double pal_contact_springs_stiffness(pal_contact_springs *springs, const int32_t *rows, const double *share, int n,
-                                     int passes, double *answer, pal_arena *scratch);
+double pal_contact_springs_stiffness(pal_contact_springs *springs, const pal_compliance *compliance,
+                                     const int32_t *rows, const double *share, int n, int passes, double *answer,
+                                     pal_arena *scratch);
 #endif

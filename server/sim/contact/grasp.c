@@ -84,7 +84,11 @@ void pal_grasp_publish(pal_grasp *g, pal_tool *tool, double k_N_m, double c_Ns_m
     pal_copy3(tool->grasp_f0_N, g->force);
     K[1] = K[2] = K[4] = 0;
     K[0] = K[3] = K[5] = *k;
-    if (g->implicit && pal_grasp_compliance_series(&g->implicit->compliance, k_N_m, K))
-        *k = fmax(STIFFNESS_N_M.low, (K[0] + K[3] + K[5]) / 3);
+    if (pal_grasp_compliance_series(&g->compliance, k_N_m, K)) *k = fmax(STIFFNESS_N_M.low, (K[0] + K[3] + K[5]) / 3);
+    /* the spring pulls at the tool's end of it, which turns with the tool */
+    pal_quat_rotate(tool->grasp_arm_m, tool->requested.quat, g->offset);
+    pal_sub3(tool->torque_Nm, tool->torque_Nm, g->torque_Nm);
+    pal_cross3(g->torque_Nm, tool->grasp_arm_m, g->force);
+    pal_add3(tool->torque_Nm, tool->torque_Nm, g->torque_Nm);
     tool->grasp_b_Ns_m = c_Ns_m * *k / fmax(k_N_m, STIFFNESS_N_M.low);
 }

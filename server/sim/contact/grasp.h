@@ -28,7 +28,6 @@ typedef struct pal_grasp_implicit {
     double k_N_m, pull[3]; /* at the sub-step's begin: stiffness, force of the spring on tissue */
     double load[3];        /* force on tissue in body->load                                    */
     double stretch_m;      /* at the end of the last sub-step                                  */
-    pal_grasp_compliance compliance;
 } pal_grasp_implicit;
 
 /* the grasp of one tool */
@@ -43,8 +42,10 @@ typedef struct pal_grasp {
     double reach_m;               /* when it closed                                       */
     double offset[3];             /* o, in the tool's axes at quaternion 1                */
     double force[3];              /* on the tool, this sub-step                           */
+    double torque_Nm[3];          /* counted in the tool's                                */
     pal_adaptive_grasp *adaptive; /* adaptive bodies only, else NULL                      */
     pal_stiffness_fit fit;        /* rendered stiffness                                   */
+    pal_grasp_compliance compliance;
     pal_grasp_implicit *implicit; /* implicit solvers only, else NULL                     */
     pal_grasp_transfer *transfer; /* heap, after a transfer; else NULL                    */
 } pal_grasp;

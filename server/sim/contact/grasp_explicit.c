@@ -43,5 +43,9 @@ void pal_grasp_act_explicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *to
     pal_grasp_add_force(g, on_tissue, body->load);
     pal_add3(tool->force_N, tool->force_N, g->force);
     tool->holding = true;
-    if (step->sub == step->n_sub - 1) pal_grasp_publish(g, tool, k, c);
+    if (step->sub != step->n_sub - 1) return;
+    if (!step->body->frozen)
+        pal_grasp_compliance_update(&g->compliance, body, body->compliance, g->node, g->weight, g->n_node, tool->here_m,
+                                    SHALLOW_RADII * tool->radius_m, step->scratch);
+    pal_grasp_publish(g, tool, k, c);
 }

@@ -20,7 +20,7 @@ void pal_grasp_act_implicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *to
     double cap = tool->force_cap_N * tool->ramp, stretch = pal_norm3(goal);
     if (body->load_cap_N > 0) cap = fmin(cap, body->load_cap_N / pal_grasp_max_weight(g));
     double kept = fmin(implicit->stretch_m, (1 - FORCE_SHARE) * cap / k);
-    double lead = pal_grasp_compliance_along(&implicit->compliance, k, fmin(k, g->fit.k_N_m), goal);
+    double lead = pal_grasp_compliance_along(&g->compliance, k, fmin(k, g->fit.k_N_m), goal);
     double max_m = kept + fmin(rise, ((1 - FORCE_SHARE) * cap - k * kept) / lead);
     if (stretch > max_m) pal_scale3(goal, max_m / stretch, goal);
     implicit->pulls = pal_finite3(goal);
@@ -96,11 +96,11 @@ bool pal_grasp_settle(void *self, pal_step *step, const double *moved, bool last
         pal_grasp_implicit *implicit = g->implicit;
         /* a grasp that was transferred leads as the one before from its second step on */
         const bool transferred = g->transfer && g->transfer->left_s > 0;
-        int n_find = implicit->found ? 0 : transferred && implicit->compliance.n_known < 3 ? 3 : 1;
+        int n_find = implicit->found ? 0 : transferred && g->compliance.n_known < 3 ? 3 : 1;
         implicit->found = true;
         for (int k = 0; k < n_find; k++)
-            pal_grasp_compliance_update(&implicit->compliance, step->body, g->node, g->weight, g->n_node, tool->here_m,
-                                        SHALLOW_RADII * tool->radius_m, step->scratch);
+            pal_grasp_compliance_update(&g->compliance, step->body, step->body->compliance, g->node, g->weight,
+                                        g->n_node, tool->here_m, SHALLOW_RADII * tool->radius_m, step->scratch);
         pal_grasp_publish(g, tool, implicit->k_N_m, implicit->k_N_m * grasps->damping_s);
     }
     return again;

@@ -55,6 +55,7 @@ bool pal_haptic_stiffness_find(const pal_haptic_stiffness *known, pal_contact_gr
     const pal_haptic_stiffness_entry *e = &known->entry[i < 0 ? 0 : i];
     double change[3];
     group->k_N_m = i < 0 ? 0 : e->k_N_m;
+    group->sideways = i < 0 ? 0 : e->sideways;
     if (i < 0) return true;
     pal_scale3(change, group->force_N, group->normal);
     pal_axpy3(change, -e->force_N, e->normal);
@@ -78,7 +79,11 @@ static void keep(pal_haptic_stiffness *known, pal_contact_group *group, const do
     if (i < 0) i = known->next++ % PAL_CONTACT_PATCH_MAX;
     group->k_N_m = k_N_m;
     pal_haptic_stiffness_entry *e = &known->entry[i];
+    /* another contact that takes its place knows nothing across */
+    const bool same =
+        e->used && e->contact == (group->force_N > 0) && pal_dot3(e->normal, group->normal) > PAL_SAME_COSINE;
     *e = (pal_haptic_stiffness_entry){.used = true,
+                                      .sideways = same ? e->sideways : 0,
                                       .time_s = known->time_s,
                                       .contact = group->force_N > 0,
                                       .force_N = group->force_N,
@@ -101,14 +106,14 @@ static double turned_N_m(const pal_contact_points *points, const pal_body *body,
     for (int k = 0; k < n; k++)
         pal_axpy3(r, part[k].weight, answer + 3 * (size_t)pal_contact_points_slot_node(body, part[k].slot));
     pal_axpy3(r, -pal_dot3(r, contact->away), contact->away);
-    return pal_norm3(contact->force) * pal_dot3(r, normal) / (radius_m - contact->depth_m);
+    return contact->normal_N * pal_dot3(r, normal) / (radius_m - contact->depth_m);
 }
 
 void pal_haptic_stiffness_contact(pal_haptic_stiffness *known, pal_contact_group *group, const double at_m[3],
-                                  pal_contact_springs *springs, int first, const pal_contact_points *points,
-                                  const pal_body *body, const pal_contact *contact, int n, double radius_m,
-                                  pal_arena *scratch)
+                                  const pal_compliance *compliance, pal_contact_springs *springs, int first,
+                                  const pal_contact *contact, int n, double radius_m, pal_arena *scratch)
 {
+    const pal_body *body = springs->body;
     size_t used = pal_arena_used(scratch);
     double *answer = PAL_NEW(scratch, double, 3 * (size_t)body->n_node), lost = 0;
     int32_t row[PAL_CONTACT_IMPLICIT_MAX];
@@ -117,63 +122,103 @@ void pal_haptic_stiffness_contact(pal_haptic_stiffness *known, pal_contact_group
     pal_scale3(inward, -1, group->normal);
     for (int i = 0; i < n; i++) {
         if (!pal_contact_group_has(inward, contact[i].away)) continue;
-        if (pal_dot3(contact[i].force, contact[i].force) == 0 || springs->k_N_m[first + i] <= 0) continue;
+        if (contact[i].normal_N == 0 || springs->k_N_m[first + i] <= 0) continue;
         share[m] = pal_dot3(contact[i].away, inward);
         row[m++] = first + i;
     }
-    double k = pal_contact_springs_stiffness(springs, row, share, m, STIFFNESS_PASSES, answer, scratch);
+    double k = pal_contact_springs_stiffness(springs, compliance, row, share, m, STIFFNESS_PASSES, answer, scratch);
     for (int i = 0; i < m && answer && k > 0; i++)
-        lost += turned_N_m(points, body, &contact[row[i] - first], radius_m, group->normal, answer);
+        lost += turned_N_m(springs->points, body, &contact[row[i] - first], radius_m, group->normal, answer);
     pal_arena_rewind(scratch, used);
-    keep(known, group, at_m, k > 0 ? fmax(STIFFNESS_N_M.low, k - lost) : 0);
+    if (k > 0) keep(known, group, at_m, fmax(STIFFNESS_N_M.low, k - lost));
 }
 
 /* ---- a weighted mean of nodes ---- */
 
-/* how the mean moves for each newton along `direction` that is shared out by weight; node NULL: all nodes in order */
-static bool solve_mean(const pal_body *body, const int32_t *node, const double *weight, int n,
-                       const double direction[3], double mean_m_N[3], pal_arena *scratch)
+/* how the mean moves for each newton along `direction` that is shared out by weight; node NULL: all nodes in order.
+ * answer [n_node][3]: how all move */
+static bool solve_mean(const pal_body *body, const pal_compliance *compliance, const int32_t *node,
+                       const double *weight, int n, const double direction[3], double mean_m_N[3], double *answer,
+                       pal_arena *scratch)
 {
     size_t used = pal_arena_used(scratch), n3 = 3 * (size_t)body->n_node;
-    double *load, *move;
-    bool known = PAL_NEW_DOUBLES(scratch, n3, &load, &move) && body->compliance;
+    double *load = PAL_NEW(scratch, double, n3);
+    bool known = load && answer && compliance;
     for (int i = 0; i < n && known; i++) pal_axpy3(load + 3 * (size_t)(node ? node[i] : i), weight[i], direction);
-    known = known && body->compliance->solve(body->compliance->self, body, load, move);
+    known = known && compliance->solve(compliance->self, body, load, answer);
     pal_set3(mean_m_N, 0, 0, 0);
-    for (int i = 0; i < n && known; i++) pal_axpy3(mean_m_N, weight[i], move + 3 * (size_t)(node ? node[i] : i));
+    for (int i = 0; i < n && known; i++) pal_axpy3(mean_m_N, weight[i], answer + 3 * (size_t)(node ? node[i] : i));
     pal_arena_rewind(scratch, used);
     return known;
 }
 
+/* to [n_node] += weight shared out over the nodes that bear a point */
+static void add_point(const pal_contact_points *points, const pal_body *body, int point, double weight, double *to)
+{
+    pal_contact_slot part[PAL_CONTACT_POINT_SLOTS];
+    int m = pal_contact_points_slots(points, body, point, part);
+    for (int k = 0; k < m; k++) to[pal_contact_points_slot_node(body, part[k].slot)] += weight * part[k].weight;
+}
+
+bool pal_haptic_stiffness_across(pal_haptic_stiffness *known, const pal_contact_group *group,
+                                 const pal_contact_points *points, const pal_body *body,
+                                 const pal_compliance *compliance, const pal_contact *contact, int n, double k_N_m,
+                                 pal_arena *scratch)
+{
+    const int at = find_entry(known, group);
+    pal_haptic_stiffness_entry *e = &known->entry[at < 0 ? 0 : at];
+    if (at < 0 || !e->contact || e->n_across >= 2) return false;
+    size_t used = pal_arena_used(scratch);
+    double *sum = PAL_NEW(scratch, double, body->n_node), *answer = PAL_NEW(scratch, double, 3 * (size_t)body->n_node);
+    double across[2][3], mean[3], inward[3], force = 0;
+    pal_scale3(inward, -1, group->normal);
+    for (int pass = 0; pass < 2 && sum; pass++)
+        for (int i = 0; i < n; i++) {
+            if (contact[i].normal_N <= 0 || !pal_contact_group_has(inward, contact[i].away)) continue;
+            if (pass == 0) force += contact[i].normal_N;
+            if (pass == 1) add_point(points, body, contact[i].point, contact[i].normal_N / force, sum);
+        }
+    pal_contact_group_across(e->normal, across);
+    if (force > 0 && k_N_m > 0 &&
+        solve_mean(body, compliance, NULL, sum, body->n_node, across[e->n_across], mean, answer, scratch))
+        e->give_m_N[e->n_across] = 1 / k_N_m + fmax(0, pal_dot3(mean, across[e->n_across])), e->n_across++;
+    pal_arena_rewind(scratch, used);
+    if (e->n_across == 2 && e->k_N_m > 0) e->sideways = 2 / (e->give_m_N[0] + e->give_m_N[1]) / e->k_N_m;
+    return true;
+}
+
 void pal_haptic_stiffness_near(pal_haptic_stiffness *known, pal_contact_group *group, const double at_m[3],
-                               const pal_contact_points *points, const pal_body *body, const int32_t *point,
-                               const double *weight, int n, double k_N_m, pal_arena *scratch)
+                               const pal_contact_points *points, const pal_body *body, const pal_compliance *compliance,
+                               const int32_t *point, const double *weight, int n, double k_N_m, pal_arena *scratch)
 {
     size_t used = pal_arena_used(scratch);
-    double *sum = PAL_NEW(scratch, double, body->n_node), inward[3], mean[3], give = 0;
-    pal_contact_slot part[PAL_CONTACT_POINT_SLOTS];
-    for (int i = 0; i < n && sum; i++) {
-        int m = pal_contact_points_slots(points, body, point[i], part);
-        for (int k = 0; k < m; k++) sum[pal_contact_points_slot_node(body, part[k].slot)] += weight[i] * part[k].weight;
-    }
+    double *sum = PAL_NEW(scratch, double, body->n_node), *answer = PAL_NEW(scratch, double, 3 * (size_t)body->n_node);
+    double inward[3], mean[3], give = 0;
+    bool found = sum && k_N_m > 0;
+    for (int i = 0; i < n && sum; i++) add_point(points, body, point[i], weight[i], sum);
     /* as contact presses: the solver starts from the answer to a load that is alike */
     pal_scale3(inward, -1, group->normal);
-    if (sum && k_N_m > 0 && solve_mean(body, NULL, sum, body->n_node, inward, mean, scratch))
-        give = 1 / k_N_m + pal_dot3(mean, inward);
+    found = found && solve_mean(body, compliance, NULL, sum, body->n_node, inward, mean, answer, scratch);
+    if (found) give = 1 / k_N_m + pal_dot3(mean, inward);
     pal_arena_rewind(scratch, used);
-    keep(known, group, at_m, give > 0 && isfinite(give) ? 1 / give : 0);
+    if (found) keep(known, group, at_m, give > 0 && isfinite(give) ? 1 / give : 0);
 }
 
 /* ---- grasp ---- */
 
-void pal_grasp_compliance_update(pal_grasp_compliance *w, const pal_body *body, const int32_t *node,
-                                 const double *weight, int n, const double at_m[3], double min_m, pal_arena *scratch)
+void pal_grasp_compliance_update(pal_grasp_compliance *w, const pal_body *body, const pal_compliance *compliance,
+                                 const int32_t *node, const double *weight, int n, const double at_m[3], double min_m,
+                                 pal_arena *scratch)
 {
     double unit[3] = {0}, mean[3];
     int axis = w->next;
-    if (!body->compliance || (w->n_known == 3 && axis == 0 && pal_dist3(w->at_m, at_m) < min_m)) return;
+    if (!compliance || (w->n_known == 3 && axis == 0 && pal_dist3(w->at_m, at_m) < min_m)) return;
     unit[axis] = 1;
-    if (!solve_mean(body, node, weight, n, unit, mean, scratch)) return;
+    size_t used = pal_arena_used(scratch);
+    double *answer = PAL_NEW(scratch, double, 3 * (size_t)body->n_node);
+    bool known = solve_mean(body, compliance, node, weight, n, unit, mean, answer, scratch);
+    pal_arena_rewind(scratch, used);
+    if (!known) return;
     pal_copy3(w->column_m_N[axis], mean);
     if (axis == 0) pal_copy3(w->at_m, at_m);
     if (w->n_known == axis) w->n_known++;
@@ -211,5 +256,5 @@ double pal_grasp_compliance_along(const pal_grasp_compliance *w, double k_N_m, d
 
 size_t pal_haptic_stiffness_scratch(const pal_body *body)
 {
-    return 9 * sizeof(double) * (size_t)body->n_node + 3 * sizeof(double) * PAL_CONTACT_IMPLICIT_MAX + 1024;
+    return 10 * sizeof(double) * (size_t)body->n_node + 3 * sizeof(double) * PAL_CONTACT_IMPLICIT_MAX + 1024;
 }

@@ -48,11 +48,15 @@ double pal_push_pressure_of_tissue(const pal_push *push, const pal_body *body, i
 double pal_push_punch_N_m(const pal_push *push, double radius_m);
 /* m from a tool's surface within which patches are published */
 double pal_push_near_m(const pal_push *push, double radius_m);
+/* velocity of the tool's surface where it touches, at -radius normal, as it moves and turns */
+void pal_push_surface_velocity(const pal_tool_contact *t, const pal_tool *tool, double velocity_m_s[3]);
 /* the side that the tool is on follows its force with a time constant, from where it was */
 void pal_push_follow_side(pal_tool_contact *t, const double side_before[3], double dt_s);
 
 /* interpolated: the stiffness that the points near a tool will want, as pal_effect.bounds.wanted */
 void pal_push_want(pal_push *push, const pal_body *body, double *bound_N_m);
+/* explicit: memory beside */
+pal_err pal_push_make_explicit(pal_push *push, pal_build *build);
 /* implicit: memory beside; pal_tangent.settle, self a pal_push */
 pal_err pal_push_make_implicit(pal_push *push, pal_build *build);
 bool pal_push_settle(void *self, pal_step *step, const double *moved, bool last);

@@ -20,11 +20,12 @@
 
 /* Coulomb friction: the tool's displacement across the tissue stretches a spring as stiff as the contact, which slips
  * at friction times the normal force; shared out like the normal force */
-static void add_friction(pal_push *push, pal_tool_contact *t, const double sum[3], double stiffness, double dt_s)
+static void add_friction(pal_push *push, pal_tool_contact *t, const pal_tool *tool, const double sum[3],
+                         double stiffness, double dt_s)
 {
     double size = pal_norm3(sum), drift[3], along[3], total = 0;
     if (push->friction <= 0 || !pal_unit3(along, sum, 0)) return;
-    pal_copy3(drift, t->proxy.v);
+    pal_push_surface_velocity(t, tool, drift);
     for (int i = 0; i < t->n_contact; i++) total += pal_norm3(t->contact[i].force);
     for (int i = 0; i < t->n_contact; i++) {
         double v[3];
@@ -56,6 +57,12 @@ static void find_share(pal_push *push, pal_tool_contact *t, int n_tool, pal_step
     t->share = share < t->share ? share : fmin(share, t->share * (1 + step->dt_s / PAL_BLEND_S));
 }
 
+static void scale_contact(pal_contact *contact, double share)
+{
+    contact->normal_N *= share;
+    pal_scale3(contact->force, share, contact->force);
+}
+
 /* after other triangles were drawn the force begins at that of before; returns the part of it */
 static double limit_rise(pal_tool_contact *t, double sum[3])
 {
@@ -65,7 +72,7 @@ static double limit_rise(pal_tool_contact *t, double sum[3])
     if (part == 1) return 1;
     t->ramp *= part;
     pal_scale3(sum, part, sum);
-    for (int i = 0; i < t->n_contact; i++) pal_scale3(t->contact[i].force, part, t->contact[i].force);
+    for (int i = 0; i < t->n_contact; i++) scale_contact(&t->contact[i], part);
     return part;
 }
 
@@ -84,13 +91,14 @@ static void press(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step 
         pal_contact *c = &t->contact[i];
         double v[3], k = scale * c->k_N_m;
         pal_contact_points_at(&push->points, c->point, push->points.v, v);
-        pal_scale3(c->force, fmax(0, k * (c->depth_m - damping_s * pal_dot3(v, c->away))), c->away);
+        c->normal_N = fmax(0, k * (c->depth_m - damping_s * pal_dot3(v, c->away)));
+        pal_scale3(c->force, c->normal_N, c->away);
         pal_add3(sum, sum, c->force);
         stiffness += k;
     }
     if (push->regime->limits_rise) stiffness *= limit_rise(t, sum);
     if (!pal_finite3(sum) || pal_dot3(sum, sum) == 0) return;
-    add_friction(push, t, sum, stiffness, step->dt_s);
+    add_friction(push, t, tool, sum, stiffness, step->dt_s);
     pal_set3(sum, 0, 0, 0);
     pal_contact_points_begin_slots(&push->points);
     for (int i = 0; i < t->n_contact; i++) {
@@ -103,19 +111,38 @@ static void press(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step 
         pal_axpy3(body->load + at, share, push->points.force + at);
     }
     pal_scale3(t->total, share, sum);
-    for (int i = 0; i < t->n_contact; i++) pal_scale3(t->contact[i].force, share, t->contact[i].force);
+    for (int i = 0; i < t->n_contact; i++) scale_contact(&t->contact[i], share);
     pal_add3(tool->force_N, tool->force_N, t->total);
     pal_add3(t->total, t->total, t->hold.now_N);
     tool->touching = true;
     pal_push_follow_side(t, t->proxy.normal, step->dt_s);
 }
 
+pal_err pal_push_make_explicit(pal_push *push, pal_build *build)
+{
+    push->springs = PAL_NEW(build->arena, pal_contact_springs, 1);
+    if (!push->springs) return PAL_ERR_MEMORY;
+    PAL_TRY(
+        pal_contact_springs_make(&push->points, build->body, PAL_CONTACT_IMPLICIT_MAX, build->arena, push->springs));
+    size_t scratch = pal_haptic_stiffness_scratch(build->body) + PAL_CONTACT_IMPLICIT_MAX * sizeof(pal_contact) +
+                     (size_t)push->points.sample.max_point * 4 * sizeof(double) + CONTACT_MAX + 256;
+    if (build->scratch_byte < scratch) build->scratch_byte = scratch;
+    build->body->wants_compliance = true;
+    return PAL_ERR_OK;
+}
+
 static void act(pal_push *push, int n_tool, pal_step *step)
 {
     for (int t = 0; t < n_tool; t++) find_share(push, &push->tool[t], n_tool, step);
     for (int t = 0; t < n_tool; t++) press(push, &push->tool[t], &step->tools->tool[t], step);
-    for (int t = 0; t < n_tool && step->sub == step->n_sub - 1; t++)
+    if (step->sub != step->n_sub - 1) return;
+    /* each tool in turn is the first to have its patches' stiffness found */
+    push->n_step++, push->n_stiffness = 0;
+    if (step->body->compliance) step->body->compliance->begin(step->body->compliance->self, step);
+    for (int k = 0; k < n_tool; k++) {
+        const int t = (k + push->n_step) % n_tool;
         pal_push_publish(push, &push->tool[t], &step->tools->tool[t], step);
+    }
 }
 
 const pal_push_regime pal_push_explicit = {.pressure_Pa_m = pal_push_pressure_of_radius,

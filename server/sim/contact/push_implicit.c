@@ -41,7 +41,7 @@ static void find_back(const pal_push *push, pal_tool_contact *t, const pal_tool 
 {
     pal_tool_contact_implicit *implicit = t->implicit;
     const pal_contact_implicit *solve = &implicit->solve;
-    double k = pal_haptic_stiffness_max(&implicit->stiffness, pal_push_punch_N_m(push, tool->radius_m));
+    double k = pal_haptic_stiffness_max(&t->stiffness, pal_push_punch_N_m(push, tool->radius_m));
     implicit->back_m = implicit->old_back_m;
     if (solve->capped || implicit->back_m > 0)
         implicit->back_m =
@@ -63,7 +63,8 @@ static void begin(pal_push *push, pal_tool_contact *t, const pal_tool *tool, pal
         if (t->contact[i].depth_m > 0) stiffness += t->contact[i].k_N_m;
     }
     (void)pal_tool_contact_friction(t, stiffness, implicit->solve.next_slip_m);
-    pal_scale3(move, step->dt_s, t->proxy.v);
+    pal_push_surface_velocity(t, tool, move);
+    pal_scale3(move, step->dt_s, move);
     pal_contact_implicit_begin(&implicit->solve, push->springs, step->body, t->contact, t->n_contact, push->friction,
                                move);
     t->n_contact = implicit->solve.n_contact;

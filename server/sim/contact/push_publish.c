@@ -66,31 +66,90 @@ static void find_near(pal_push *push, pal_tool_contact *t, const double here[3],
             sum += weight[n++] = area;
         }
     for (int i = 0; i < n; i++) weight[i] /= sum;
-    pal_haptic_stiffness_near(&t->implicit->stiffness, group, here, &push->points, step->body, point, weight, n, k,
-                              step->scratch);
+    pal_haptic_stiffness_near(&t->stiffness, group, here, &push->points, step->body, step->body->compliance, point,
+                              weight, n, k, step->scratch);
+}
+
+/* stiffness of an explicit contact: the springs that press, as stiff as their forces are, or each second, third ... */
+static void find_pressed(pal_push *push, pal_tool_contact *t, const double here[3], pal_step *step,
+                         pal_contact_group *group)
+{
+    size_t used = pal_arena_used(step->scratch);
+    pal_contact *contact = PAL_NEW(step->scratch, pal_contact, PAL_CONTACT_IMPLICIT_MAX);
+    int n_press = 0, n = 0, seen = 0;
+    for (int i = 0; i < t->n_contact; i++) n_press += t->contact[i].normal_N > 0;
+    const int stride = 1 + n_press / (PAL_CONTACT_IMPLICIT_MAX + 1);
+    pal_contact_springs_begin(push->springs);
+    for (int i = 0; i < t->n_contact && contact; i++) {
+        if (!(t->contact[i].normal_N > 0) || seen++ % stride != 0) continue;
+        contact[n] = t->contact[i];
+        contact[n].normal_N *= stride;
+        contact[n].k_N_m = contact[n].normal_N / contact[n].depth_m;
+        if (pal_contact_springs_add(push->springs, contact[n].point, contact[n].away, contact[n].k_N_m) < 0) break;
+        n++;
+    }
+    pal_haptic_stiffness_contact(&t->stiffness, group, here, step->body->compliance, push->springs, 0, contact, n,
+                                 t->limits.radius_m, step->scratch);
+    pal_arena_rewind(step->scratch, used);
 }
 
 /* k1 of a group from the solver's compliance, found again when it has changed, within the step's budget */
 static void find_stiffness(pal_push *push, pal_tool_contact *t, const pal_tool *tool, pal_step *step, const double *x,
                            pal_contact_group *group)
 {
-    pal_tool_contact_implicit *implicit = t->implicit;
+    const pal_tool_contact_implicit *implicit = t->implicit;
     double here[3], radius = tool->radius_m;
     pal_sub3(here, tool->here_m, step->body->offset_m);
-    implicit->stiffness.time_s = step->time_s;
-    if (!pal_haptic_stiffness_find(&implicit->stiffness, group, here, SHALLOW_RADII * radius)) return;
-    if (push->n_stiffness >= STIFFNESS_BUDGET || (group->force_N > 0 && implicit->solve.constant)) return;
+    t->stiffness.time_s = step->time_s;
+    const bool due = pal_haptic_stiffness_find(&t->stiffness, group, here, SHALLOW_RADII * radius);
+    if (push->n_stiffness >= STIFFNESS_BUDGET || (group->force_N > 0 && implicit && implicit->solve.constant)) return;
+    if (!due) {
+        double k = implicit ? implicit->solve.friction_N_m : 0;
+        for (int i = 0; i < t->n_contact && !implicit; i++)
+            if (t->contact[i].normal_N > 0) k += t->contact[i].normal_N / t->contact[i].depth_m;
+        push->n_stiffness +=
+            push->friction > 0 &&
+            pal_haptic_stiffness_across(&t->stiffness, group, &push->points, step->body, step->body->compliance,
+                                        t->contact, t->n_contact, k, step->scratch);
+        return;
+    }
     push->n_stiffness++;
-    if (group->force_N > 0)
-        pal_haptic_stiffness_contact(&implicit->stiffness, group, here, push->springs, implicit->solve.first,
-                                     &push->points, step->body, t->contact, t->n_contact, radius, step->scratch);
+    if (group->force_N > 0 && implicit)
+        pal_haptic_stiffness_contact(&t->stiffness, group, here, step->body->compliance, push->springs,
+                                     implicit->solve.first, t->contact, t->n_contact, radius, step->scratch);
+    else if (group->force_N > 0)
+        find_pressed(push, t, here, step, group);
     else
         find_near(push, t, here, step, x, group);
+}
+
+/* Contacts act on the tool's surface, at (radius - depth) away; a force toward the centre has no torque, friction has
+ */
+static void add_torque(pal_tool_contact *t, pal_tool *tool)
+{
+    double torque[3];
+    pal_sub3(tool->torque_Nm, tool->torque_Nm, t->torque_Nm);
+    pal_set3(t->torque_Nm, 0, 0, 0);
+    for (int i = 0; i < t->n_contact; i++) {
+        const pal_contact *c = &t->contact[i];
+        if (!(c->normal_N > 0)) continue;
+        pal_cross3(torque, c->force, c->away);
+        pal_axpy3(t->torque_Nm, tool->radius_m - c->depth_m, torque);
+    }
+    pal_add3(tool->torque_Nm, tool->torque_Nm, t->torque_Nm);
+}
+
+void pal_push_surface_velocity(const pal_tool_contact *t, const pal_tool *tool, double velocity_m_s[3])
+{
+    pal_cross3(velocity_m_s, t->proxy.normal, tool->omega_rad_s);
+    pal_scale3(velocity_m_s, tool->radius_m, velocity_m_s);
+    pal_add3(velocity_m_s, velocity_m_s, t->proxy.v);
 }
 
 void pal_push_publish(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step *step)
 {
     if (!t->active) return;
+    add_torque(t, tool);
     pal_contact_group group[PAL_CONTACT_PATCH_MAX] = {0};
     int n = 0;
     size_t used = pal_arena_used(step->scratch);
@@ -112,7 +171,8 @@ void pal_push_publish(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_s
     }
     pal_arena_rewind(step->scratch, used);
     double k = pal_haptic_stiffness_clamp(pal_push_punch_N_m(push, radius));
-    pal_contact_patch_options options = {.radius_m = radius,
+    pal_contact_patch_options options = {.step_s = step->dt_s * step->n_sub,
+                                         .radius_m = radius,
                                          .k_start_N_m = k,
                                          .b_s = step->body->damping_1_s * 4.0 / 3 * M_PI *
                                                 push->material.density_kg_m3 * radius * radius * radius / k,

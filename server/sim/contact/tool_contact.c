@@ -78,11 +78,11 @@ static void take_force(pal_tool_contact *to, const pal_body *body, const pal_too
 static void keep_state(pal_tool_contact *to, const pal_tool_contact *from)
 {
     to->share = from->share;
+    to->stiffness = from->stiffness;
     if (!to->implicit || !from->implicit) return;
     pal_copy3(to->implicit->solve.next_slip_m, from->implicit->solve.next_slip_m);
     to->implicit->solve.next_slides = from->implicit->solve.next_slides;
     to->implicit->solve.normal_N = from->implicit->solve.normal_N;
-    to->implicit->stiffness = from->implicit->stiffness;
 }
 
 void pal_tool_contact_transfer(pal_tool_contact *to, const pal_body *body, const pal_tool_contact *from,

@@ -17,7 +17,6 @@
 /* additional state with an implicit solver */
 typedef struct pal_tool_contact_implicit {
     pal_contact_implicit solve;
-    pal_haptic_stiffness stiffness;
     pal_contact_patches old_patches; /* published again when the solver solves again */
     int n_old_patch;
     double old_side[3], old_back_m;
@@ -57,6 +56,8 @@ typedef struct pal_tool_contact {
     double wanted_1_s2;  /* interpolated: stiffness over mass that the solver made its sub-steps for */
     double share;        /* of the stiffness that is stable; falls at once, rises slowly; implicit: 1 */
     double total[3];     /* on the tool, this sub-step, this body */
+    double torque_Nm[3]; /* counted in the tool's                 */
+    pal_haptic_stiffness stiffness;
     pal_contact_patches patches;
     pal_contact_blend hold;
     pal_tool_contact_implicit *implicit; /* implicit solvers only */

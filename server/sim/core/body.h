@@ -16,14 +16,20 @@
 #include "server/sim/core/tuning.h"
 
 struct pal_body;
+struct pal_step;
 
 /* The static answer of the body to a load at its present shape, from an implicit solver with a static factor
- * (implicit/compliance.h) */
+ * (implicit/compliance.h), or for an explicit one beside it (implicit/tissue_compliance.h) */
 typedef struct pal_compliance {
     void *self;
     /* displacement [n_node][3] that the forces [n_node][3] (N, zero at most nodes) would cause once all is at rest
      * again; false: not known (no supports, no factor). No heap. [sim] */
     bool (*solve)(void *self, const struct pal_body *body, const double *force_N, double *move_m);
+    /* explicit solvers only, else NULL: in the last sub-step of a step, before it is asked; the body is back at rest;
+     * frees heap memory. step->body is written to and restored by solve */
+    void (*begin)(void *self, struct pal_step *step);
+    void (*reset)(void *self);
+    void (*destroy)(void *self);
 } pal_compliance;
 
 /* quantities that can be shown in colour; computed only while a client asks for one (component field_output) */

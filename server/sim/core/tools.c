@@ -15,6 +15,18 @@ bool pal_pose_ok(const pal_pose *pose, double limit_m)
     return far2 <= limit_m * limit_m && fast2 <= 1e6 * limit_m * limit_m && quat2 > 0.9 && quat2 < 1.1;
 }
 
+/* the rotation q = requested * conjugate(last) about axis by angle: q = (cos, axis sin) of half of it */
+static void find_omega(pal_tool *tool, double dt_s)
+{
+    const double *a = tool->requested.quat, *b = tool->last.quat;
+    const double w = a[0] * b[0] + pal_dot3(a + 1, b + 1);
+    double v[3];
+    pal_cross3(v, b + 1, a + 1);
+    for (int c = 0; c < 3; c++) v[c] = b[0] * a[c + 1] - a[0] * b[c + 1] + v[c];
+    const double sine = pal_norm3(v);
+    pal_scale3(tool->omega_rad_s, sine > 0 ? 2 * atan2(w < 0 ? -sine : sine, fabs(w)) / (sine * dt_s) : 0, v);
+}
+
 void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose, double dt_s)
 {
     if (pose) {
@@ -36,7 +48,9 @@ void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose, double dt_s)
     tool->touching = tool->holding = false;
     tool->n_patch = 0;
     tool->has_grasp = false;
-    for (int c = 0; c < 3; c++) tool->force_N[c] = tool->mean_force_N[c] = 0;
+    memset(tool->grasp_arm_m, 0, sizeof tool->grasp_arm_m);
+    for (int c = 0; c < 3; c++) tool->force_N[c] = tool->mean_force_N[c] = tool->torque_Nm[c] = 0;
+    find_omega(tool, dt_s);
 }
 
 void pal_tools_begin_substep(pal_tools *tools, int sub, int n_sub, double dt_s)

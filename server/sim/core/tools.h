@@ -17,6 +17,9 @@ typedef struct pal_pose {
     uint32_t buttons;       /* bit 0: grasp */
     uint32_t seq;           /* client's count, echoed */
     uint64_t stamp_us;      /* client's clock, echoed */
+    /* of the device, for status only: what it commanded at this pose, and the opening of its gripper, rad or m */
+    bool commands_force;
+    double force_N[3], opening;
 } pal_pose;
 
 /* Contact model for a haptic bridge, linearised at the tool: the plane of zero force in the configuration space of the
@@ -44,15 +47,18 @@ typedef struct pal_tool {
     pal_pose requested, last; /* at the end of this step, of the last one */
     double here_m[3];         /* position at the end of the current sub-step                                  */
     double velocity_m_s[3];   /* of `here`                                                                    */
+    double omega_rad_s[3];    /* from the orientation of the last step to this one's, for friction             */
     bool grasp;               /* bit 0 of requested.buttons while present                                          */
     double force_N[3];        /* on the tool, this sub-step; CONTACT components add                              */
     double mean_force_N[3];   /* mean over the step's sub-steps                                               */
+    double torque_Nm[3];      /* of contacts and grasps about its centre, in the last sub-step; components add */
     bool grasped_before;      /* it held tissue in the last step: it does not push what it holds */
     bool touching, holding;   /* presses tissue, holds tissue in this step                                    */
     int n_patch;
     pal_contact_patch patch[PAL_CONTACT_PATCH_MAX]; /* written by CONTACT components in the last sub-step */
     bool has_grasp; /* bilateral part: f = f0 - k (x - x0) - b v                              */
     double grasp_x0_m[3], grasp_f0_N[3], grasp_k_N_m[6], grasp_b_Ns_m; /* k: xx xy xz yy yz zz                    */
+    double grasp_arm_m[3]; /* from its centre to where f acts, turned with it: torque arm x f                    */
 } pal_tool;
 
 typedef struct pal_tools {

@@ -74,10 +74,8 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
     if (build->body->display.n_shown == 0)
         return PAL_REFUSE(build->diag, "%s: tool_grasp needs a body with a shown surface", entry->path);
     size_t n_node = (size_t)build->body->n_node, scratch = 6 * sizeof(double) * n_node + 256;
-    if (build->body->implicit) {
-        build->body->wants_compliance = true;
-        if (build->scratch_byte < scratch) build->scratch_byte = scratch;
-    }
+    if (build->scratch_byte < scratch) build->scratch_byte = scratch;
+    build->body->wants_compliance = true;
     grasps->act = build->body->implicit ? pal_grasp_act_implicit : pal_grasp_act_explicit;
     grasps->n_tool = build->scene->n_tool;
     grasps->grasp = PAL_NEW(build->arena, pal_grasp, grasps->n_tool);
@@ -167,6 +165,7 @@ static void close_grasp(pal_grasps *grasps, pal_grasp *g, const pal_tool *tool, 
            tissue = 2 * grasps->young_Pa * reach / (1 - grasps->poisson * grasps->poisson);
     pal_stiffness_fit_start(&g->fit, fmax(STIFFNESS_N_M.low, k * tissue / (k + tissue)));
     pal_stiffness_fit_add(&g->fit, tool->last.position_m, (double[3]){0}, tool->radius_m);
+    g->compliance = (pal_grasp_compliance){.n_known = 0};
     if (g->implicit) *g->implicit = (pal_grasp_implicit){.pulls = false};
 }
 
@@ -286,8 +285,11 @@ static pal_err run(void *self, pal_step *step)
     pal_tools *tools = step->tools;
     int n_tool = tools->n_tool < grasps->n_tool ? tools->n_tool : grasps->n_tool;
     if (step->sub == 0) update_nodes(grasps, step->body);
+    const pal_compliance *compliance = step->body->compliance;
+    if (compliance && compliance->begin && step->sub == step->n_sub - 1) compliance->begin(compliance->self, step);
     for (int t = 0; t < n_tool; t++) {
         pal_grasp *g = &grasps->grasp[t];
+        pal_set3(g->torque_Nm, 0, 0, 0);
         if (step->sub == 0) begin_tool(grasps, g, &tools->tool[t], step->body);
         if (g->implicit) g->implicit->pulls = false;
         if (g->closed && !step->body->frozen) grasps->act(grasps, g, &tools->tool[t], step);

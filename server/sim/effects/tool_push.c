@@ -31,11 +31,12 @@ static pal_err material(void *self, const pal_body *body, const pal_material *ma
 static void reset(void *self, const pal_body *body)
 {
     pal_push *push = self;
-    (void)body;
     push->points.sub_step += 2; /* the body jumped: velocities start again */
     push->n_step = 0;
+    if (body->compliance && body->compliance->reset) body->compliance->reset(body->compliance->self);
     for (int t = 0; t < push->n_tool; t++) {
         push->tool[t].active = false;
+        push->tool[t].stiffness = (pal_haptic_stiffness){.next = 0};
         push->tool[t].share = 1;
         pal_tool_contact_end_blend(&push->tool[t]);
         if (push->tool[t].implicit) *push->tool[t].implicit = (pal_tool_contact_implicit){.solve.across = -1};
@@ -90,7 +91,7 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
                    : build->body->active        ? &pal_push_held_load
                    : build->body->interpolation ? &pal_push_interpolated
                                                 : &pal_push_explicit;
-    if (build->body->implicit) PAL_TRY(pal_push_make_implicit(push, build));
+    PAL_TRY(build->body->implicit ? pal_push_make_implicit(push, build) : pal_push_make_explicit(push, build));
     reset(push, build->body);
     *self = push;
     return PAL_ERR_OK;
@@ -174,6 +175,7 @@ static void approach(pal_push *push, pal_tool_contact *h, pal_tool *tool, pal_st
 {
     h->n_contact = 0;
     pal_set3(h->total, 0, 0, 0);
+    pal_set3(h->torque_Nm, 0, 0, 0);
     if (!h->active) return;
     double here[3];
     pal_sub3(here, tool->here_m, step->body->offset_m);

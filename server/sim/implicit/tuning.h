@@ -27,14 +27,16 @@
  * takes effect is its operations over this (tests/sim/solvers/test_solve_report.c) */
 #define PAL_REFRESH_FLOPS 1e9
 
-/* estimated relative error of the square of a body's lowest frequency at which the search ends; measured errors of the
- * frequency are below 1 %, but for two modes less than 3 % apart, of the 5 % that damping, sleep and reports need. Of
+/* estimated relative error at which two searches end: of the square of a body's lowest frequency, which is then below
+ * 1 % off, but for two modes less than 3 % apart, of the 5 % that damping, sleep and reports need; and of the static
+ * compliance of an explicit body as the preconditioner sees it: at 1e-2 a stiffness is 10 % off the slope of the force
+ * (tests/sim/implicit/test_lowest_frequency.c, tests/sim/contact/test_haptic_models.c). Of
  * diagonal over mass, the shift that makes a singular stiffness definite, and the square of a frequency below which a
  * body counts as not held: a slender body has 1e-7, rounding of differences of forces 1e-11
  * (tests/sim/implicit/test_lowest_frequency.c) */
-#define PAL_FREQUENCY_TOLERANCE 5e-3
-#define PAL_FREQUENCY_SHIFT     1e-12
-#define PAL_FREQUENCY_ZERO      1e-10
+#define PAL_SEARCH_TOLERANCE 2e-3
+#define PAL_FREQUENCY_SHIFT  1e-12
+#define PAL_FREQUENCY_ZERO   1e-10
 
 enum {
     /* products with all nodes, times nodes, that finding an interpolated matrix may take at load, ten seconds of 500
@@ -46,8 +48,9 @@ enum {
     PAL_FREQUENCY_CLUSTER = 3,
     /* iterations of the search at most: several times what bodies with loose border elements take */
     PAL_FREQUENCY_ITERATIONS = 300,
-    /* columns of an interpolated matrix found again in a simulated second after an edit, each the work of one product:
-     * a few in a step */
+    /* products in a simulated second, four in 1/60 s: columns of an interpolated matrix found again after an edit, and
+     * of the true stiffness for the static compliance of an explicit body, 8 evaluations of forces beside those of some
+     * 20 sub-steps (tests/sim/contact/test_haptic_models.c) */
     PAL_PROBES_1_S = 240,
     /* Newton iterations, at most, of a sub-step that began with one and gained energy */
     PAL_SAFEGUARD_NEWTON = 8

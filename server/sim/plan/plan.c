@@ -5,6 +5,7 @@
 #include "server/sim/core/effect_list.h"
 #include "server/sim/core/step_guard.h"
 #include "server/sim/implicit/lowest_frequency.h"
+#include "server/sim/implicit/tissue_compliance.h"
 #include "server/sim/plan/plan_requests.h"
 
 #include <stdlib.h>
@@ -122,6 +123,8 @@ static pal_err make_components(pal_plan_requests *s, pal_component *list, int *n
      * last: the others have said what they want of it */
     for (int pass = 0; pass < 3; pass++) {
         if (pass == 2) PAL_TRY(find_damping(s, list + first, *n_component - first));
+        if (pass == 2 && s->build.body->wants_compliance && !s->build.body->implicit)
+            PAL_TRY(pal_tissue_compliance_make(&s->build));
         for (int i = 0; i < s->n_request; i++) {
             pal_stage stage = s->request[i].effect->stage;
             if (pass != (stage == PAL_STAGE_OUTPUT ? 0 : stage == PAL_STAGE_SOLVE ? 2 : 1)) continue;
@@ -203,8 +206,12 @@ static pal_err build_all(const pal_scene *scene, pal_arena *arena, pal_diagnosti
 /* frees what bodies own beside the arena */
 static void free_models(pal_plan *plan)
 {
-    for (int b = 0; b < plan->n_body && plan->body; b++)
+    for (int b = 0; b < plan->n_body && plan->body; b++) {
+        const pal_compliance *compliance = plan->body[b].compliance;
+        if (compliance && compliance->destroy) compliance->destroy(compliance->self);
+        plan->body[b].compliance = NULL;
         if (plan->body[b].dofs.destroy) plan->body[b].dofs.destroy(&plan->body[b]);
+    }
 }
 
 pal_err pal_plan_build(const pal_scene *scene, pal_arena *arena, pal_diagnostic *diag, pal_plan *out)

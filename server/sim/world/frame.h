@@ -43,14 +43,16 @@ typedef struct pal_frame_part {
 
 typedef struct pal_frame_tool {
     bool present, touching, holding;
-    pal_pose pose;     /* latest pose used, with its seq and stamp */
-    uint64_t pose_ns;  /* of the session's clock, when that pose arrived */
-    double force_N[3]; /* on the tool, mean over the step                */
+    pal_pose pose;         /* latest pose used, with its seq and stamp */
+    uint64_t pose_ns;      /* of the session's clock, when that pose arrived */
+    double force_N[3];     /* on the tool, mean over the step                */
+    double end_force_N[3]; /* at its end, where the tool is at its pose  */
+    double torque_Nm[3];   /* about its centre, at the step's end           */
     double radius_m;
     int n_patch;
     pal_contact_patch patch[PAL_CONTACT_PATCH_MAX];
     bool has_grasp;
-    double grasp_x0_m[3], grasp_f0_N[3], grasp_k_N_m[6], grasp_b_Ns_m;
+    double grasp_x0_m[3], grasp_f0_N[3], grasp_k_N_m[6], grasp_b_Ns_m, grasp_arm_m[3];
 } pal_frame_tool;
 
 typedef struct pal_frame {

@@ -74,6 +74,8 @@ static void copy_tool(const pal_world *w, int t, pal_frame_tool *to)
     to->pose = tool->last;
     to->pose_ns = w->pose_ns[t];
     pal_copy3(to->force_N, tool->mean_force_N);
+    pal_copy3(to->end_force_N, tool->force_N);
+    pal_copy3(to->torque_Nm, tool->torque_Nm);
     to->radius_m = tool->radius_m;
     to->n_patch = tool->n_patch;
     memcpy(to->patch, tool->patch, sizeof to->patch);
@@ -82,6 +84,7 @@ static void copy_tool(const pal_world *w, int t, pal_frame_tool *to)
     pal_copy3(to->grasp_f0_N, tool->grasp_f0_N);
     memcpy(to->grasp_k_N_m, tool->grasp_k_N_m, sizeof to->grasp_k_N_m);
     to->grasp_b_Ns_m = tool->grasp_b_Ns_m;
+    pal_copy3(to->grasp_arm_m, tool->grasp_arm_m);
 }
 
 void pal_world_frame(const pal_world *world, pal_frame *out)

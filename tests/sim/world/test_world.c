@@ -62,16 +62,17 @@ static void has_rows_only_for_what_the_scene_calls_for(void)
     box_free(&box);
 }
 
-/* the plan of a spring scene as it was before finite elements came: rows, and their bytes but for a pointer or two */
+/* the plan of a spring scene as it was before finite elements came: rows, and their bytes but for a pointer or two;
+ * since then tools have springs of contact and the body a static compliance, for what a haptic bridge renders */
 static void spring_scenes_pay_nothing_for_finite_elements(void)
 {
     static const struct {
         const char *name;
         size_t n_byte;
-    } was[] = {{"tool_push", 1785152}, {"tool_grasp", 5568},    {"edge_distance", 14464}, {"face_area", 22272},
+    } was[] = {{"tool_push", 2122944}, {"tool_grasp", 6080},    {"edge_distance", 14464}, {"face_area", 22272},
                {"tet_volume", 11008},  {"viscous", 64},         {"gravity", 64},          {"verlet", 1344},
                {"finite_guard", 3904}, {"surface_output", 4800}};
-    enum { N_ROW = sizeof was / sizeof was[0], WORLD = 2725000, POINTERS = 256 };
+    enum { N_ROW = sizeof was / sizeof was[0], WORLD = 3290000, POINTERS = 256 };
     pal_prepared box;
     REQUIRE(!box_make(4, 3, 3, 0.01, &box));
     pal_scene *scene = calloc(1, sizeof *scene);
@@ -97,7 +98,7 @@ static void spring_scenes_pay_nothing_for_finite_elements(void)
     /* the body's own struct has grown as well, and there is a field more that a row may come for */
     size_t field = 2 * PAL_BODY_MAX * sizeof(void *);
     CHECK(pal_world_bytes(world) <= (size_t)WORLD + 2 * POINTERS + sizeof(pal_body) + field);
-    CHECK(!pal_world_body(world, 0)->implicit && !pal_world_body(world, 0)->compliance);
+    CHECK(!pal_world_body(world, 0)->implicit && pal_world_body(world, 0)->compliance->begin);
     pal_world_destroy(world);
     free(scene);
     box_free(&box);

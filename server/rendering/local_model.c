@@ -1,6 +1,6 @@
-#include "clients/haptic_bridge/local_model.h"
-#include "clients/haptic_bridge/tuning.h"
+#include "server/rendering/local_model.h"
 #include "server/base/vec3.h"
+#include "server/rendering/tuning.h"
 
 #include <string.h>
 

@@ -10,9 +10,9 @@
  * directions, its elastic part at most force_max. torque    sum of -r n x (F_n + F_t): the tool is a sphere of the
  * patch's radius r energy    integrals of the elastic parts: of N over d, kt |e|^2 / 2, and f K^-1 f / 2 of the grasp's
  * f Thread: [servo]; no heap, no locks. */
-#ifndef PAL_HAPTIC_BRIDGE_LOCAL_CONTACT_H
-#define PAL_HAPTIC_BRIDGE_LOCAL_CONTACT_H
-#include "clients/haptic_bridge/local_model.h"
+#ifndef PAL_RENDERING_LOCAL_CONTACT_H
+#define PAL_RENDERING_LOCAL_CONTACT_H
+#include "server/rendering/local_model.h"
 
 /* what contact remembers of each group: initially zero */
 typedef struct pal_local_contact_state {

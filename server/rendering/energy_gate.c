@@ -1,5 +1,5 @@
-#include "clients/haptic_bridge/energy_gate.h"
-#include "clients/haptic_bridge/tuning.h"
+#include "server/rendering/energy_gate.h"
+#include "server/rendering/tuning.h"
 
 #include <math.h>
 

@@ -1,6 +1,6 @@
-#include "clients/haptic_bridge/local_contact.h"
-#include "clients/haptic_bridge/tuning.h"
+#include "server/rendering/local_contact.h"
 #include "server/base/vec3.h"
+#include "server/rendering/tuning.h"
 
 /* the acting patch of a convex group at a place */
 typedef struct acting {

@@ -10,8 +10,8 @@
  * the start + leak t + what the tank owes (tank < 0). While it owes and the handle moves, the passivity controller
  * damps; below its level at the start a little damping, which a hand hardly notices, fills it again, so that a model
  * that is held back comes soon. Energies are those at the device. Thread: [servo]; no heap, no locks. */
-#ifndef PAL_HAPTIC_BRIDGE_ENERGY_GATE_H
-#define PAL_HAPTIC_BRIDGE_ENERGY_GATE_H
+#ifndef PAL_RENDERING_ENERGY_GATE_H
+#define PAL_RENDERING_ENERGY_GATE_H
 
 typedef struct pal_energy_gate {
     double max_J, leak_W;        /* set by the caller */

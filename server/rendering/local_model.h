@@ -7,8 +7,8 @@
  * interpolated in f = f0 - K (x - x0), and comes and goes likewise. Its K is symmetrised and its eigenvalues are
  * clamped to [0, limit]; along an axis without stiffness its force has no bounded energy and is left out. Thread:
  * [servo]; no heap, no locks. */
-#ifndef PAL_HAPTIC_BRIDGE_LOCAL_MODEL_H
-#define PAL_HAPTIC_BRIDGE_LOCAL_MODEL_H
+#ifndef PAL_RENDERING_LOCAL_MODEL_H
+#define PAL_RENDERING_LOCAL_MODEL_H
 #include "protocol/wire.h"
 
 #include <stdbool.h>
