@@ -1,6 +1,6 @@
 /* The energy gate against its invariant: what was given to the hand is at most the tank at the start, leak and debt. */
-#include "server/rendering/energy_gate.h"
 #include "clients/haptic_bridge/tuning.h"
+#include "server/rendering/energy_gate.h"
 #include "tests/check.h"
 #include "tests/fixtures/random.h"
 

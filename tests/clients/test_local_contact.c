@@ -1,7 +1,7 @@
 /* The local contact model against its formulas (clients/haptic_bridge/README.md, "One tick"): normal force, friction,
  * grasp, torque, stored energy. */
-#include "server/rendering/local_contact.h"
 #include "server/base/vec3.h"
+#include "server/rendering/local_contact.h"
 #include "tests/check.h"
 #include "tests/fixtures/random.h"
 
