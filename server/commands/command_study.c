@@ -6,7 +6,7 @@
 #include "server/calibrate/journal.h"
 #include "server/cli/report.h"
 #include "server/commands/commands.h"
-#include "server/commands/felt_force.h"
+#include "server/commands/rendered_force.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/json_reader.h"
 #include "server/study/studied_scene.h"
@@ -352,7 +352,7 @@ static pal_err measure(study_run *run, pal_diagnostic *diag)
                            .method = run->n_method ? run->method : NULL,
                            .n_method = run->n_method,
                            .samples = run->input.has_samples ? &run->input.samples : NULL,
-                           .renderer = &pal_felt_force,
+                           .renderer = &pal_rendered_force,
                            .before = run->before,
                            .recall = recall,
                            .remember = remember,

@@ -4,7 +4,7 @@
 #include "server/study/study_store.h"
 
 #include "server/base/vec3.h"
-#include "server/commands/felt_force.h"
+#include "server/commands/rendered_force.h"
 #include "server/mesh/geometry/procedural.h"
 #include "server/study/study_job.h"
 #include "tests/check.h"
@@ -97,7 +97,7 @@ static void the_bridge_is_nearer_on_finer_meshes_and_shorter_ways(void)
     organ o;
     char name[PAL_CONFIGURATION_TEXT];
     const pal_study_point *coarse = NULL, *fine = NULL;
-    REQUIRE(run(&o, &pal_felt_force));
+    REQUIRE(run(&o, &pal_rendered_force));
     const pal_study *s = o.study;
     for (int i = 0; i < s->n_point; i++) {
         const pal_study_point *p = &s->point[i];

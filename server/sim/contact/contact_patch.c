@@ -58,7 +58,7 @@ static void follow(pal_contact_patch_track *track, const pal_contact_patch_optio
      * moves at once */
     const double part = exp(-options->step_s / FOLLOW_S - pal_norm3(move) / (SHALLOW_RADII * options->radius_m));
     if (touches != track->contact || !(track->k_N_m > 0)) track->k_N_m = track->fit.k_N_m;
-    track->k_N_m = part * track->k_N_m + (1 - part) * track->fit.k_N_m;
+    track->k_N_m = pal_haptic_stiffness_clamp(part * track->k_N_m + (1 - part) * track->fit.k_N_m);
     track->contact = touches;
     pal_copy3(track->normal, group->normal);
 }

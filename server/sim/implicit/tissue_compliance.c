@@ -64,10 +64,18 @@ static bool multiply(pal_tissue_compliance *tissue, const double *p)
     return good;
 }
 
+static void forget_answers(pal_tissue_compliance *tissue)
+{
+    for (int k = 0; k < PAL_TISSUE_ANSWERS; k++) tissue->answer[k].size2 = 0, tissue->answer[k].used = 0;
+    tissue->n_call = 0;
+}
+
 static void reset(void *self)
 {
     pal_tissue_compliance *tissue = self;
-    for (int k = 0; k < PAL_TISSUE_ANSWERS; k++) tissue->answer[k].size2 = 0;
+    forget_answers(tissue);
+    tissue->credit = tissue->time_s = 0;
+    tissue->known = false;
 }
 
 /* the diagonal's inverse for the present topology: of the components' row sums where the body adapts, else 1 */
@@ -82,7 +90,7 @@ static void find_diagonal(pal_tissue_compliance *tissue)
         tissue->inverse[i] = body->active && tissue->bound[i] > 0 ? 1 / tissue->bound[i] : 1;
     tissue->known = true;
     tissue->revision = body->display.revision;
-    reset(tissue);
+    forget_answers(tissue);
 }
 
 /* z of the residual */

@@ -1,4 +1,4 @@
-#include "server/commands/felt_force.h"
+#include "server/commands/rendered_force.h"
 
 #include "server/base/vec3.h"
 #include "server/rendering/energy_gate.h"
@@ -12,14 +12,14 @@ typedef struct use {
     double lambda, age_s; /* share of the newest model, extrapolation of its surfaces */
 } use;
 
-typedef struct felt {
+typedef struct rendering {
     pal_local_blend blend;
     pal_local_contact_state memory;
     pal_energy_gate gate;
     use in_use, wanted;
     double blend_s, x_m[3], force_N[3];
     bool placed;
-} felt;
+} rendering;
 
 static void to_float(float to[3], const double from[3])
 {
@@ -48,7 +48,7 @@ static void message(const pal_tool *tool, pal_wire_haptic *out)
 
 static void arrive(void *state, const pal_tool *tool, double period_s)
 {
-    felt *s = state;
+    rendering *s = state;
     pal_wire_haptic model;
     message(tool, &model);
     if (!pal_local_blend_start(&s->blend, s->in_use.lambda, s->in_use.age_s, &model, &limits)) return;
@@ -56,14 +56,14 @@ static void arrive(void *state, const pal_tool *tool, double period_s)
     s->blend_s = fmin(fmax(period_s, BLEND_MIN_S), BLEND_MAX_S);
 }
 
-static double stored(const felt *s, use of)
+static double stored(const rendering *s, use of)
 {
     pal_local_model mix;
     pal_local_blend_mix(&s->blend, of.lambda, of.age_s, &mix);
     return pal_local_contact_energy(&mix, s->x_m, &limits, &s->memory);
 }
 
-static use between(const felt *s, double share)
+static use between(const rendering *s, double share)
 {
     return (use){s->in_use.lambda + share * (s->wanted.lambda - s->in_use.lambda),
                  s->in_use.age_s + share * (s->wanted.age_s - s->in_use.age_s)};
@@ -76,7 +76,7 @@ static double stored_after(const void *user, double share)
 
 static void tick(void *state, double dt_s, const double x_m[3], const double v_m_s[3], double force_N[3])
 {
-    felt *s = state;
+    rendering *s = state;
     pal_local_model mix;
     pal_local_contact_result contact;
     double step[3];
@@ -98,4 +98,4 @@ static void tick(void *state, double dt_s, const double x_m[3], const double v_m
     pal_copy3(force_N, contact.force_N);
 }
 
-const pal_study_renderer pal_felt_force = {sizeof(felt), arrive, tick};
+const pal_study_renderer pal_rendered_force = {sizeof(rendering), arrive, tick};
