@@ -393,6 +393,7 @@ int link_ws_callback(struct lws *wsi, enum lws_callback_reasons reason, void *us
         lws_set_opaque_user_data(wsi, NULL);
         link_lost(link, in ? in : "no connection");
         break;
+    case LWS_CALLBACK_CLOSED_CLIENT_HTTP: /* before the handshake was answered: the library reports one or the other */
     case LWS_CALLBACK_CLIENT_CLOSED:
         lws_set_opaque_user_data(wsi, NULL);
         link_lost(link, link->close_why[0] ? link->close_why : "connection closed");
