@@ -214,6 +214,7 @@ static void a_body_asleep_is_neither_stepped_nor_encoded(void)
 int main(void)
 {
     if (!small_scene_make(&organ, "small")) return 1;
+    organ.scene.body[0].material.young_Pa = 5e4; /* it bears its weight: nothing inverts, no safeguard acts */
     RUN(components_name_their_part_and_reason);
     RUN(an_instructor_switches_a_component_and_all_are_told);
     RUN(others_do_not_and_bad_orders_are_refused);
