@@ -90,6 +90,7 @@ static void net_joined(pal_bridge_net *n)
 {
     n->generation++;
     n->echo_seq = 0;
+    n->count.n_reconnect += n->count.joined;
     n->count.joined = true;
     if (!n->joined_ns) n->joined_ns = pal_clock_ns();
     pal_servo_put_generation(n->servo, n->generation);

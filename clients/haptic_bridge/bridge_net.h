@@ -20,8 +20,8 @@ typedef struct pal_bridge_net_options {
 typedef struct pal_bridge_net_counts {
     bool joined; /* a server answered */
     int tool;
-    uint64_t n_pose, n_model, n_refused;
-    pal_jitter rtt; /* own clock - echoed stamp - holding time of the server */
+    uint64_t n_pose, n_model, n_refused, n_reconnect; /* reconnect: joined again after a loss */
+    pal_jitter rtt;                                   /* own clock - echoed stamp - holding time of the server */
     char reason[128];
 } pal_bridge_net_counts;
 

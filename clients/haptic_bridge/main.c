@@ -160,7 +160,7 @@ static cJSON *main_json(const bridge *b, const pal_servo_timing *t, const pal_se
         {"models_old", JSON_NUMBER(v->n_model_old)}, {"stale", JSON_NUMBER(v->n_stale)},
         {"faults", JSON_NUMBER(v->n_fault)}, {"not_finite", JSON_NUMBER(v->n_not_finite)},
         {"poses", JSON_NUMBER(c->n_pose)}, {"tool", JSON_NUMBER(c->tool)}, {"joined", JSON_BOOL(c->joined)},
-        {"position_m", cJSON_CreateDoubleArray(v->position_m, 3)});
+        {"reconnects", JSON_NUMBER(c->n_reconnect)}, {"position_m", cJSON_CreateDoubleArray(v->position_m, 3)});
 }
 
 static void main_table(const bridge *b, const pal_servo_timing *t, const pal_servo_view *v,

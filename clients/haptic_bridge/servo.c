@@ -16,6 +16,7 @@ typedef struct servo_model {
     uint32_t generation;
     bool empty; /* only a change of generation */
     uint64_t arrival_ns;
+    double late_s; /* its delay above the usual least one */
     pal_wire_haptic haptic;
 } servo_model;
 
@@ -36,6 +37,10 @@ struct pal_servo {
     pal_command_queue *events;
     atomic_bool estop, rearm, stalled;
     _Atomic uint64_t ticks;
+    /* of [net]: least usual delay of the models of a session, with the unknown offset of the two clocks */
+    double least_delay_s;
+    uint64_t last_arrival_ns;
+    uint32_t delay_generation;
     /* the rest belongs to [servo] */
     servo_model model; /* the newest; empty: none */
     uint64_t last_ns, rest_ns;
@@ -85,6 +90,7 @@ pal_err pal_servo_create(const pal_servo_options *options, pal_servo **out)
     memcpy(s->place.frame.rotation, s->o.rotation, sizeof s->o.rotation);
     pal_workspace_restart(&s->place);
     s->gate = (pal_energy_gate){.max_J = TANK_MAX_J, .leak_W = options->leak_W, .tank_J = TANK_START_J};
+    s->least_delay_s = INFINITY;
     s->model.empty = true;
     s->first = true;
     s->clutch_fade = s->scale_down = 1;
@@ -101,12 +107,25 @@ void pal_servo_destroy(pal_servo *servo)
     free(servo);
 }
 
+/* delay of a model above the least one of its session, which is forgotten slowly: s */
+static double servo_late(pal_servo *s, const pal_wire_haptic *model, uint32_t generation, uint64_t arrival_ns)
+{
+    const double delay = 1e-9 * (double)(int64_t)(arrival_ns - 1000 * model->stamp_us);
+    const double since = 1e-9 * (double)(int64_t)(arrival_ns - s->last_arrival_ns);
+    const bool other = generation != s->delay_generation;
+    s->least_delay_s = other ? delay : fmin(delay, s->least_delay_s + DELAY_FORGOTTEN * fmax(since, 0));
+    s->last_arrival_ns = arrival_ns;
+    s->delay_generation = generation;
+    return delay - s->least_delay_s;
+}
+
 void pal_servo_put_model(pal_servo *servo, const pal_wire_haptic *model, uint32_t generation, uint64_t arrival_ns)
 {
     servo_model *slot = pal_triple_buffer_slot(&servo->models);
     slot->generation = generation;
     slot->empty = false;
     slot->arrival_ns = arrival_ns;
+    slot->late_s = servo_late(servo, model, generation, arrival_ns);
     slot->haptic = *model;
     pal_triple_buffer_publish(&servo->models);
 }
@@ -333,9 +352,15 @@ static double servo_stale_after(const pal_servo *s)
 }
 
 /* time since the arrival of the model in use; one that came while the tick was under way is new */
-static double servo_model_age_s(const pal_servo *s, uint64_t now)
+static double servo_since_arrival_s(const pal_servo *s, uint64_t now)
 {
     return s->model.empty || now < s->model.arrival_ns ? 0 : (double)(now - s->model.arrival_ns) * 1e-9;
+}
+
+/* time since the model in use was made, as far as its delay tells */
+static double servo_model_age_s(const pal_servo *s, uint64_t now)
+{
+    return s->model.empty ? 0 : servo_since_arrival_s(s, now) + s->model.late_s;
 }
 
 static void servo_toward(double *value, double wanted, double step)
@@ -392,8 +417,11 @@ static servo_use servo_wanted(const pal_servo *s, uint64_t now, double dt)
     const double gain = s->fade * s->clutch_fade * s->scale_down;
     double k_max = s->o.info.stiffness_max_N_m;
     if (s->degraded >= 1) k_max = fmin(k_max, DEGRADED_K_N_M);
-    return (servo_use){.lambda = fmin(1, s->use.lambda + dt / s->blend_s),
-                       .age_s = fmin(servo_model_age_s(s, now), EXTRAPOLATE_MAX_S),
+    const double lambda = fmin(1, s->use.lambda + dt / s->blend_s);
+    /* the model before has been moved on to the arrival, so that only the newest one has to catch up */
+    const double late_s = s->model.empty ? 0 : lambda * s->model.late_s;
+    return (servo_use){.lambda = lambda,
+                       .age_s = fmin(servo_since_arrival_s(s, now) + late_s, EXTRAPOLATE_MAX_S),
                        .gain = fmin(gain, s->use.gain + dt * s->fade_rate),
                        .wall_gain = s->degraded == 2 ? 0 : fmin(s->scale_down, s->use.wall_gain + dt / FADE_START_S),
                        .stiffness_max_N_m = k_max / (s->place.frame.scale * s->o.force_scale)};

@@ -11,9 +11,10 @@
  *   - ARMING lasts until the dead man's switch is held and the handle rests (< 0.05 m/s) for 0.5 s; force then fades in
  *     over 1 s.
  *   - FREE and CONTACT render forces.
- *   - STALE begins when the newest model is older than max(100 ms, 4 frame times, twice the usual longest gap). Force
- *     fades out over 500 ms under 3 N s/m damping; FREE without a model (0.5 N s/m) follows. A new model fades in over
- *     250 ms or as the tank allows.
+ *   - STALE begins when the newest model is older than max(100 ms, 4 frame times, twice the usual longest gap). Its age
+ *     counts from when it was made: time since its arrival, and its delay above the least usual one. Force fades out
+ * over 500 ms under 3 N s/m damping; FREE without a model (0.5 N s/m) follows. A new model fades in over 250 ms or as
+ * the tank allows.
  *   - ESTOP and FAULT give no force until re-armed. E-stop is latched. A fault of speed, number or stalled loop re-arms
  *     by the conditions of ARMING, and so does a lost device when it answers again.
  *
@@ -99,7 +100,8 @@ bool pal_servo_device_lost(const pal_servo *servo);
 void pal_servo_end(pal_servo *servo);
 
 /* [net] The newest model wins. generation changes with every new session (reconnect); models of older ones are
- * dropped. arrival_ns: time of its arrival on the clock of the ticks; may be after the tick that takes it */
+ * dropped. arrival_ns: time of its arrival on the clock of the ticks; may be after the tick that takes it. Its stamp_us
+ * is the server's time of making it; of the two clocks only the rates have to agree */
 void pal_servo_put_model(pal_servo *servo, const pal_wire_haptic *model, uint32_t generation, uint64_t arrival_ns);
 /* [net] the server is lost or has returned as another session: drops the model at once and fades */
 void pal_servo_put_generation(pal_servo *servo, uint32_t generation);
@@ -121,7 +123,7 @@ typedef struct pal_servo_view {
     double proxy_m[PAL_LOCAL_PATCH_MAX][3]; /* tool's centre on the surface of each contact, for display */
     double fade, grip;                      /* fade: gain of the model that is rendered */
     uint32_t flags, buttons;                /* PAL_WIRE_POSE_*, PAL_WIRE_GRASP       */
-    uint32_t model_seq, model_age_us;
+    uint32_t model_seq, model_age_us;       /* age since the model was made */
     uint64_t model_stamp_us;
     uint64_t n_model, n_model_old, n_saturated, n_clamped, n_stale, n_fault, n_not_finite;
     uint64_t n_passivity;                        /* ticks in which the passivity controller damped */

@@ -14,6 +14,9 @@
 /* s. A model older than max(this, 4 frame times, twice the usual longest gap), at most STALE_MAX_S, is stale */
 #define STALE_MIN_S 0.1
 #define STALE_MAX_S 0.5
+/* s of delay forgotten each s. A route that is longer by 200 ms is the usual one after 12 s, clocks may drift apart by
+ * a hundredth of it, and a stall of 1.5 s makes models look younger by 15 ms */
+#define DELAY_FORGOTTEN 0.01
 /* s. Fades: out when stale, in after it, in after arming, out for the clutch */
 #define FADE_OUT_S    0.5
 #define FADE_IN_S     0.25

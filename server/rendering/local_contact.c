@@ -200,6 +200,7 @@ void pal_local_contact_force(const pal_local_model *model, const double x_m[3], 
     acting a;
     grasp_at(&model->grasp, x_m, limits, out->force_N, &out->saturated);
     pal_axpy3(out->force_N, -model->grasp.b_Ns_m, v_m_s);
+    pal_cross3(out->torque_N_m, model->grasp.arm_m, out->force_N);
     for (int i = 0; i < model->n_patch; i++) {
         if (!group_at(model, i, x_m, limits, memory, &a)) continue;
         const pal_local_patch *p = a.patch;

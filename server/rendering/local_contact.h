@@ -7,9 +7,9 @@
  * |e| = mu_d N and F_t has no damping; it sticks again below 1 mm/s. The anchor moves with the surface. both      times
  * 1 - smoothstep(r, 1.5 r, tangential distance from p_i) Where the tangent k1 + 2 k2 d passes the device's limit, N
  * continues with the limit as its slope; N never falls with depth. A grasp gives f0 - K (x - x0) - b v in all
- * directions, its elastic part at most force_max. torque    sum of -r n x (F_n + F_t): the tool is a sphere of the
- * patch's radius r energy    integrals of the elastic parts: of N over d, kt |e|^2 / 2, and f K^-1 f / 2 of the grasp's
- * f Thread: [servo]; no heap, no locks. */
+ * directions, its elastic part at most force_max. torque    sum of -r n x (F_n + F_t), the tool a sphere of the
+ * patch's radius r, and of a grasp its arm x its force energy    integrals of the elastic parts: of N over d, kt |e|^2
+ * / 2, and f K^-1 f / 2 of the grasp's f Thread: [servo]; no heap, no locks. */
 #ifndef PAL_RENDERING_LOCAL_CONTACT_H
 #define PAL_RENDERING_LOCAL_CONTACT_H
 #include "server/rendering/local_model.h"

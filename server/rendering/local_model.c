@@ -65,6 +65,7 @@ void pal_local_blend_mix(const pal_local_blend *blend, double lambda, double age
     between3(out->grasp.f_N, a->f_N, b->f_N, lambda);
     for (int k = 0; k < 6; k++) out->grasp.K_N_m[k] = between(a->K_N_m[k], b->K_N_m[k], lambda);
     out->grasp.b_Ns_m = between(a->b_Ns_m, b->b_Ns_m, lambda);
+    between3(out->grasp.arm_m, a->arm_m, b->arm_m, lambda);
 }
 
 static void patch_of_wire(const pal_wire_haptic *model, const pal_wire_contact_patch *from, pal_local_patch *to)
@@ -116,7 +117,7 @@ static void grasp_of_wire(const pal_wire_haptic *model, const pal_local_limits *
     *to = (pal_local_grasp){0};
     for (int k = 0; k < 3; k++) to->at_m[k] = model->origin_m[k] + (double)model->grasp_x0_m[k];
     if (!model->has_grasp) return;
-    for (int k = 0; k < 3; k++) f[k] = (double)model->grasp_f0_N[k];
+    for (int k = 0; k < 3; k++) f[k] = (double)model->grasp_f0_N[k], to->arm_m[k] = (double)model->grasp_arm_m[k];
     for (int k = 0; k < 6; k++) K[k] = (double)model->grasp_k_N_m[k];
     eigen3(K, w, v);
     for (int i = 0; i < 3; i++) {
@@ -167,7 +168,8 @@ static bool model_finite(const pal_wire_haptic *m)
 {
     double sum = 0;
     for (int k = 0; k < 3; k++)
-        sum += fabs(m->origin_m[k]) + (double)(fabsf(m->grasp_x0_m[k]) + fabsf(m->grasp_f0_N[k]));
+        sum += fabs(m->origin_m[k]) +
+               (double)(fabsf(m->grasp_x0_m[k]) + fabsf(m->grasp_f0_N[k]) + fabsf(m->grasp_arm_m[k]));
     for (int k = 0; k < 6; k++) sum += (double)fabsf(m->grasp_k_N_m[k]);
     sum += (double)fabsf(m->grasp_b_N_s_m);
     for (uint32_t i = 0; i < m->n_patch; i++) {

@@ -27,6 +27,7 @@ typedef struct pal_local_grasp {
     double f_N[3], at_m[3]; /* force on the tool at at_m */
     double K_N_m[6];        /* xx xy xz yy yz zz, positive semi-definite */
     double b_Ns_m;
+    double arm_m[3]; /* from the tool's centre to where the force acts */
 } pal_local_grasp;
 
 typedef struct pal_local_model {

@@ -83,7 +83,8 @@ static inline void rig_tick(device_rig *r)
 {
     const bool calls = r->o.info.thread_model != PAL_DEVICE_POLLED;
     if (r->seq++ % 16 == 0) {
-        pal_wire_haptic model = {.seq = r->seq, .n_patch = 1, .frame_us = 16667};
+        const uint64_t stamp_us = manual_clock_now(&r->clock) / 1000;
+        pal_wire_haptic model = {.seq = r->seq, .stamp_us = stamp_us, .n_patch = 1, .frame_us = 16667};
         model.patch[0] =
             (pal_wire_contact_patch){.id = 1, .group = 1, .n = {0, 0, 1}, .k1_N_m = RIG_STIFFNESS, .radius_m = 1};
         pal_servo_put_model(r->servo, &model, 1, manual_clock_now(&r->clock));

@@ -45,6 +45,20 @@ check "it ends well" $? == 0
 check "without a server models are stale" "$(sed -n 's/.* \([0-9]*\) times stale/\1/p' "$work/gone")" '>=' 1
 check "and the device is free again" "$(grep -c 'state free;' "$work/gone")" == 1
 
+# the server comes back on the same port, and the bridge to it
+start_server --port "$port"
+timeout 110 "$bin/palpate-bridge" --server "$url" --device "$(device touch)" --seconds 100 --json >"$work/back" 2>"$work/back.err" &
+job=$! pids="$pids $!"
+members 1
+kill "$server_job"
+wait "$server_job" 2>/dev/null
+start_server --port "$port"
+members 1
+stop $job
+check "a bridge joins a server again that comes back" "$(json reconnects "$work/back")" == 1
+kill "$server_job"
+wait "$server_job" 2>/dev/null
+
 # a scene whose up is y, grasped and pulled: the device's up is the scene's, and the hand feels what the tissue gives
 sed 's/"gravity_m_s2": 0,/"gravity_m_s2": 0, "up": [0, 1, 0],/' "$work/ball.json" >"$work/up.json"
 scene=$work/up.json

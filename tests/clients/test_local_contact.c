@@ -257,6 +257,32 @@ static void grasp_pulls_and_pushes_with_its_matrix(void)
     CHECK_NEAR(at(&m, 0, 0, 0, v, &floor, NULL).force_N[2], -1 - 2.5e-3 * 113.0 * 0.1, 2e-4);
 }
 
+/* arm x f with what damping gives; half way from a grasp to another one, half way in arm and force */
+static void grasp_turns_the_tool_by_its_arm(void)
+{
+    const float K[6] = {100, 0, 0, 100, 0, 100};
+    const double v[3] = {0, 0.1, 0}, x[3] = {0.1, -0.2, 0.301};
+    pal_wire_haptic m = grasp(-1, K);
+    m.grasp_b_N_s_m = 2;
+    m.grasp_arm_m[0] = 0.02f, m.grasp_arm_m[1] = 0.01f;
+    /* (0.02 0.01 0) x (0 -0.2 -1.1) = (-0.011 0.022 -0.004) */
+    pal_local_contact_result r = at(&m, 0, 0, 0.001, v, &limits, NULL);
+    const double whole[3] = {-0.011, 0.022, -0.004};
+    CHECK_LE(pal_dist3(r.torque_N_m, whole), 1e-8);
+    pal_local_blend blend = {0};
+    pal_local_model mix;
+    CHECK(pal_local_blend_start(&blend, 0, 0, &m, &limits));
+    m.grasp_arm_m[0] = -0.02f, m.grasp_f0_N[2] = 1;
+    CHECK(pal_local_blend_start(&blend, 1, 0, &m, &limits));
+    pal_local_blend_mix(&blend, 0.5, 0, &mix);
+    pal_local_contact_force(&mix, x, still, 1e-3, &limits, NULL, &r);
+    /* (0 0.01 0) x (0 0 -0.1) */
+    const double half[3] = {-0.001, 0, 0};
+    CHECK_LE(pal_dist3(r.torque_N_m, half), 1e-8);
+    m.grasp_arm_m[1] = NAN;
+    CHECK(!pal_local_blend_start(&blend, 1, 0, &m, &limits));
+}
+
 /* eigenvalues: 1500 above the limit of 1000, -50 below 0, 200. The axis without stiffness renders no force */
 static void stiffness_of_a_grasp_is_clamped_along_its_axes(void)
 {
@@ -401,6 +427,7 @@ int main(void)
     RUN(friction_is_carried_by_a_moving_surface_and_damped_while_it_sticks);
     RUN(friction_turns_a_sphere_and_turning_it_stretches_the_contact);
     RUN(grasp_pulls_and_pushes_with_its_matrix);
+    RUN(grasp_turns_the_tool_by_its_arm);
     RUN(stiffness_of_a_grasp_is_clamped_along_its_axes);
     RUN(stored_energy_is_the_integral_of_the_force);
     RUN(numbers_that_are_not_finite_are_refused);

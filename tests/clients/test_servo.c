@@ -4,8 +4,10 @@
 #include "clients/haptic_bridge/servo.h"
 #include "server/base/vec3.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 
-#define TICK_NS 1000000u
+#define TICK_NS  1000000u
+#define FRAME_NS 16666667u
 
 typedef struct trial {
     void *device;
@@ -45,12 +47,19 @@ static void rig_close(trial *r)
     pal_device_virtual()->close(r->device);
 }
 
+/* the next model, made at a time, arrives now */
+static void rig_model(trial *r, uint64_t made_ns)
+{
+    r->model.seq = ++r->seq;
+    r->model.stamp_us = made_ns / 1000;
+    pal_servo_put_model(r->servo, &r->model, r->generation, r->now_ns);
+}
+
 static void rig_tick(trial *r)
 {
     if (r->serving && r->now_ns >= r->next_model_ns) {
-        r->model.seq = ++r->seq;
-        pal_servo_put_model(r->servo, &r->model, r->generation, r->now_ns);
-        r->next_model_ns = r->now_ns + 16666667;
+        rig_model(r, r->now_ns);
+        r->next_model_ns = r->now_ns + FRAME_NS;
     }
     pal_servo_tick(r->servo, r->now_ns);
     const pal_servo_view *view = pal_servo_take_view(r->servo);
@@ -135,7 +144,7 @@ static void stale_model_fades_out_in_100_and_500_ms_and_comes_back_slowly(void)
     const double before = rig_force(&r);
     CHECK(before > 0.1);
     r.serving = false;
-    const uint64_t last = r.next_model_ns - 16666667;
+    const uint64_t last = r.next_model_ns - FRAME_NS;
     double worst_step = 0, at = before;
     while (r.now_ns < last + 99000000) rig_tick(&r);
     CHECK_NEAR(rig_force(&r), before, 0.02);
@@ -174,12 +183,110 @@ static void model_that_comes_during_the_tick_is_fresh(void)
     REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
     rig_run(&r, 4);
     r.model.seq = ++r.seq;
+    r.model.stamp_us = r.now_ns / 1000 + 5;
     pal_servo_put_model(r.servo, &r.model, r.generation, r.now_ns + 5000);
     rig_tick(&r);
     CHECK_INT(r.view.model_seq, r.seq);
     CHECK_INT(r.view.model_age_us, 0);
     CHECK_INT(r.view.n_stale, 0);
     CHECK_NEAR(r.view.fade, 1, 0);
+    rig_close(&r);
+}
+
+/* a stream stands still; then its oldest models arrive, one each tick, of a surface that is now 4 mm higher, now lower
+ */
+static void models_of_a_stall_that_arrive_in_a_burst_are_stale(void)
+{
+    for (int t = 0; t < 2; t++) {
+        trial r;
+        REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
+        rig_run(&r, 4);
+        CHECK(rig_force(&r) > 0.1);
+        const uint64_t began = r.next_model_ns;
+        const int n_late = t ? 80 : 9; /* the newest of them 150 ms old or more */
+        double fade = 1, step = 0, at[3];
+        r.serving = false;
+        rig_run(&r, t ? 1.5 : 0.3);
+        fade = r.view.fade;
+        CHECK_NEAR(fade, t ? 0 : 0.6, 0.05);
+        pal_copy3(at, r.view.force_N);
+        for (int i = 0; i < n_late; i++) {
+            const uint64_t made = began + (uint64_t)i * FRAME_NS;
+            r.model.patch[0].p_m[2] = i % 2 ? 0.004f : -0.004f;
+            rig_model(&r, made);
+            rig_tick(&r);
+            CHECK(r.view.flags & PAL_WIRE_POSE_STALE);
+            /* a hundredth of the stall is forgotten */
+            CHECK_NEAR(r.view.model_age_us, (double)(r.now_ns - TICK_NS - made) * 1e-3, t ? 16e3 : 4e3);
+            CHECK_NEAR(r.view.fade, fmax(0, fade - 2e-3 * (i + 1)), 1e-9);
+            step = fmax(step, pal_dist3(at, r.view.force_N));
+            pal_copy3(at, r.view.force_N);
+        }
+        CHECK_INT(r.view.n_stale, 1);
+        /* models in time again */
+        r.model.patch[0].p_m[2] = 0;
+        r.next_model_ns = r.now_ns;
+        r.serving = true;
+        for (int i = 0; i < 2000; i++) {
+            rig_tick(&r);
+            step = fmax(step, pal_dist3(at, r.view.force_N));
+            pal_copy3(at, r.view.force_N);
+        }
+        printf("  stall of %g s: largest step %.3f N, at the end %.2f N\n", t ? 1.5 : 0.3, step, rig_force(&r));
+        CHECK_LE(step, 0.1);
+        CHECK_INT(r.view.n_stale, 1);
+        CHECK(rig_force(&r) > 0.1);
+        rig_close(&r);
+    }
+}
+
+/* one way of a round trip of 150 ms with jitter of 50 ms, in order; then the way is longer by 200 ms for good */
+static void jitter_makes_nothing_stale_and_a_longer_way_becomes_the_usual_one(void)
+{
+    trial r;
+    REQUIRE(rig_open(&r, "premium,script=cycle,clock=virtual", 300));
+    uint64_t seed = 7, made = r.now_ns, arrives = 0, oldest_us = 0, stale_ticks = 0;
+    double peak = 0;
+    r.serving = false;
+    for (int i = 0; i < 50000; i++) {
+        const double way = 0.075 + 0.025 * random_signed(&seed) + (i < 30000 ? 0 : 0.2);
+        if (arrives == 0) arrives = made + (uint64_t)(way * 1e9);
+        if (arrives <= r.now_ns) {
+            rig_model(&r, made);
+            made += FRAME_NS;
+            arrives = 0;
+        }
+        rig_tick(&r);
+        if (i < 30000) {
+            CHECK_INT(r.view.n_stale, 0);
+            oldest_us = r.view.model_age_us > oldest_us ? r.view.model_age_us : oldest_us;
+        }
+        if (i >= 45000) peak = fmax(peak, rig_force(&r));
+        if (i >= 31000) stale_ticks += (r.view.flags & PAL_WIRE_POSE_STALE) != 0;
+    }
+    printf("  jitter: oldest model %.1f ms; longer way: stale for %.1f s, then %.2f N\n", (double)oldest_us * 1e-3,
+           1 + (double)stale_ticks * 1e-3, peak);
+    /* the jitter and the distance of two models */
+    CHECK_LE(oldest_us, 70000);
+    CHECK(oldest_us > 50000);
+    CHECK(stale_ticks > 5000 && stale_ticks < 14000);
+    CHECK(peak > 0.5);
+    rig_close(&r);
+}
+
+/* every 30 ms a model of a rising surface; from the second half on all are 10 ms late */
+static void surface_of_a_late_model_moves_on_from_when_it_was_made(void)
+{
+    trial r;
+    REQUIRE(rig_open(&r, "inverse3,script=press-hold,clock=virtual", 300));
+    rig_run(&r, 5);
+    r.serving = false;
+    r.model.patch[0].v_m_s[2] = 0.002f;
+    for (int i = 0; i < 600; i++) {
+        if (i % 30 == 0) rig_model(&r, r.now_ns - (i < 300 ? 0 : 10000000));
+        rig_tick(&r);
+        if (i % 300 == 299) CHECK_NEAR(r.view.proxy_m[0][2], 0.002 * (i < 300 ? 0.029 : 0.039), 0.002 * 0.003);
+    }
     rig_close(&r);
 }
 
@@ -597,6 +704,9 @@ int main(void)
     RUN(press_and_hold_on_a_plane_is_stable_and_feels_its_stiffness);
     RUN(stale_model_fades_out_in_100_and_500_ms_and_comes_back_slowly);
     RUN(model_that_comes_during_the_tick_is_fresh);
+    RUN(models_of_a_stall_that_arrive_in_a_burst_are_stale);
+    RUN(jitter_makes_nothing_stale_and_a_longer_way_becomes_the_usual_one);
+    RUN(surface_of_a_late_model_moves_on_from_when_it_was_made);
     RUN(emergency_stop_takes_force_away_within_two_ticks_and_stays);
     RUN(force_keeps_its_cap_and_rises_no_faster_than_the_cap_in_10_ms);
     RUN(continuous_rating_scales_a_long_push_down);

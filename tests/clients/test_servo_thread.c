@@ -56,7 +56,8 @@ static void rig_end(trial *r, pal_servo_timing *timing)
 /* what the network side does meanwhile: a model in, events out */
 static void serve(trial *r)
 {
-    pal_wire_haptic model = {.seq = ++r->seq, .n_patch = 1, .frame_us = 16667};
+    const uint64_t stamp_us = manual_clock_now(&r->clock) / 1000;
+    pal_wire_haptic model = {.seq = ++r->seq, .stamp_us = stamp_us, .n_patch = 1, .frame_us = 16667};
     model.patch[0] = (pal_wire_contact_patch){.id = 1, .group = 1, .n = {0, 0, 1}, .k1_N_m = 300};
     pal_servo_put_model(r->servo, &model, 1, manual_clock_now(&r->clock));
     pal_servo_event event;

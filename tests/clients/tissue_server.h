@@ -87,7 +87,8 @@ static inline void tissue_solve(tissue_rig *r, pal_wire_haptic *m)
     const double *x = r->seen.x;
     double depth, N;
     tissue_normal(r, x, r->now_ns, &depth, &N);
-    *m = (pal_wire_haptic){.seq = ++r->seq, .frame_us = 16667, .echo_seq = r->seen.seq, .n_patch = 1};
+    *m = (pal_wire_haptic){
+        .seq = ++r->seq, .stamp_us = r->now_ns / 1000, .frame_us = 16667, .echo_seq = r->seen.seq, .n_patch = 1};
     pal_copy3(m->origin_m, x);
     const double tangent = r->o.k1 + (depth > 0 ? 2 * r->o.k2 * depth : 0);
     const double k = fmax(10, tangent * (1 + r->o.k_jitter * random_signed(&r->seed)));

@@ -30,6 +30,7 @@ through outage models=420,stale=1,force_N=0.06 cycles=420
 check "outage: the models of the bridge get stale" "$(json stale "$work/bridge_outage")" '>=' 1
 for profile in lan 20 50 80 150 200 outage; do
     check "$profile: both keep their connections" "$(connections $profile)" == 4
+    check "$profile: so says the bridge" "$(json reconnects "$work/bridge_$profile")" == 0
     check "$profile: so says the client" "$(json reconnects "$work/client_$profile")" == 0
 done
 finish
