@@ -38,7 +38,7 @@ struct pal_servo {
     atomic_bool estop, rearm, stalled;
     _Atomic uint64_t ticks;
     /* of [net]: least usual delay of the models of a session, with the unknown offset of the two clocks */
-    double least_delay_s;
+    double min_delay_s;
     uint64_t last_arrival_ns;
     uint32_t delay_generation;
     /* the rest belongs to [servo] */
@@ -90,7 +90,7 @@ pal_err pal_servo_create(const pal_servo_options *options, pal_servo **out)
     memcpy(s->place.frame.rotation, s->o.rotation, sizeof s->o.rotation);
     pal_workspace_restart(&s->place);
     s->gate = (pal_energy_gate){.max_J = TANK_MAX_J, .leak_W = options->leak_W, .tank_J = TANK_START_J};
-    s->least_delay_s = INFINITY;
+    s->min_delay_s = INFINITY;
     s->model.empty = true;
     s->first = true;
     s->clutch_fade = s->scale_down = 1;
@@ -113,10 +113,10 @@ static double servo_late(pal_servo *s, const pal_wire_haptic *model, uint32_t ge
     const double delay = 1e-9 * (double)(int64_t)(arrival_ns - 1000 * model->stamp_us);
     const double since = 1e-9 * (double)(int64_t)(arrival_ns - s->last_arrival_ns);
     const bool other = generation != s->delay_generation;
-    s->least_delay_s = other ? delay : fmin(delay, s->least_delay_s + DELAY_FORGOTTEN * fmax(since, 0));
+    s->min_delay_s = other ? delay : fmin(delay, s->min_delay_s + DELAY_FORGOTTEN * fmax(since, 0));
     s->last_arrival_ns = arrival_ns;
     s->delay_generation = generation;
-    return delay - s->least_delay_s;
+    return delay - s->min_delay_s;
 }
 
 void pal_servo_put_model(pal_servo *servo, const pal_wire_haptic *model, uint32_t generation, uint64_t arrival_ns)

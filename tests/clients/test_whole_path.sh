@@ -34,9 +34,9 @@ begin one palpate-client "$url" --script press --depth 0.006 --seconds 110 --too
 one=$job
 begin two palpate-client "$url" --script idle --seconds 110 --name two
 two=$job
-# at 60 Hz five seconds of touch
+# at 60 Hz twenty seconds of touch: a slow device touches before a bridge has heard all of the record
 begin lcm palpate-bridge --server "$bus" --session ball --tool 0 --origin 0,0,0.048 --device "$(device touch)" \
-    --until models=300,force_N=0.06
+    --until models=1200,force_N=0.06
 by_lcm=$job
 begin ws palpate-bridge --server "$url" --tool 1 --device "$(device premium)" --script cycle --until models=11,force_N=0.06
 by_ws=$job
@@ -71,8 +71,8 @@ stop "$server_job"
 begin replay palpate-bridge --server "$bus" --session ball --tool 0 --origin 0,0,0.048 --device "$(device touch)" \
     --until models=11,force_N=0.06
 replay=$job
-# slowly, so that a slow device has touched before the record ends
-timeout 100 lcm-logplayer -s 0.25 -l "$bus" -e 'PALPATE1/ball/HMODEL/0' "$work/record" >/dev/null 2>&1 &
+# at the pace of the record: models that came ever later would be stale
+timeout 100 lcm-logplayer -l "$bus" -e 'PALPATE1/ball/HMODEL/0' "$work/record" >/dev/null 2>&1 &
 player=$!
 pids="$pids $player"
 wait $replay
