@@ -203,15 +203,18 @@ static pal_err build_all(const pal_scene *scene, pal_arena *arena, pal_diagnosti
     return PAL_ERR_OK;
 }
 
-/* frees what bodies own beside the arena */
-static void free_models(pal_plan *plan)
+/* frees what n components and the bodies own beside the arena. A solver's compliance goes with it, so the bodies' own
+ * are freed first */
+static void free_all(pal_plan *plan, pal_component *component, int n)
 {
     for (int b = 0; b < plan->n_body && plan->body; b++) {
         const pal_compliance *compliance = plan->body[b].compliance;
         if (compliance && compliance->destroy) compliance->destroy(compliance->self);
         plan->body[b].compliance = NULL;
-        if (plan->body[b].dofs.destroy) plan->body[b].dofs.destroy(&plan->body[b]);
     }
+    for (int i = 0; i < n; i++) pal_plan_destroy_component(&component[i]);
+    for (int b = 0; b < plan->n_body && plan->body; b++)
+        if (plan->body[b].dofs.destroy) plan->body[b].dofs.destroy(&plan->body[b]);
 }
 
 pal_err pal_plan_build(const pal_scene *scene, pal_arena *arena, pal_diagnostic *diag, pal_plan *out)
@@ -221,10 +224,8 @@ pal_err pal_plan_build(const pal_scene *scene, pal_arena *arena, pal_diagnostic 
     *out = (pal_plan){0};
     pal_component made[PAL_BODY_MAX * PAL_PLAN_REQUEST_MAX] = {{0}};
     pal_err err = build_all(scene, arena, diag, s, made, out);
-    /* components that were made before something was refused */
-    for (int i = 0; err && i < out->n_component; i++) pal_plan_destroy_component(&made[i]);
-    if (err) {
-        free_models(out);
+    if (err) { /* components that were made before something was refused */
+        free_all(out, made, out->n_component);
         *out = (pal_plan){0};
     }
     free(s);
@@ -233,7 +234,6 @@ pal_err pal_plan_build(const pal_scene *scene, pal_arena *arena, pal_diagnostic 
 
 void pal_plan_free(pal_plan *plan)
 {
-    for (int i = 0; i < plan->n_component; i++) pal_plan_destroy_component(&plan->component[i]);
+    free_all(plan, plan->component, plan->n_component);
     plan->n_component = 0;
-    free_models(plan);
 }
