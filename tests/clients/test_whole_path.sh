@@ -66,10 +66,11 @@ for what in BODY/0 STATUS TOOL/0 HMODEL/0 HSTATUS/0 HCONFIG/0 HEVENT/0; do # too
     check "the record has PALPATE1/ball/$what" "$(heard $what)" '>' 0
 done
 
-# without any server the record alone makes a bridge feel
+# without any server the record alone makes a bridge feel; its hand waits until the recorded hand has pressed, because a
+# model that rises around a hand may not push it
 stop "$server_job"
-begin replay palpate-bridge --server "$bus" --session ball --tool 0 --origin 0,0,0.048 --device "$(device touch)" \
-    --until models=11,force_N=0.06
+begin replay palpate-bridge --server "$bus" --session ball --tool 0 --origin 0,0,0.048 \
+    --device "$(device touch),wait=7" --until models=11,force_N=0.06
 replay=$job
 # at the pace of the record: models that came ever later would be stale
 timeout 100 lcm-logplayer -l "$bus" -e 'PALPATE1/ball/HMODEL/0' "$work/record" >/dev/null 2>&1 &
