@@ -68,7 +68,8 @@ static const char *shared_path(const char *file)
 /* a surface from a file, or with path NULL the shape; pressed where it is farthest along the axis */
 static pal_err take(const char *name, const char *path, int axis, pressed *out, pal_diagnostic *diag)
 {
-    const pal_surface_scene options = {.label = -1, .adaptive = true, .shape = name, .material = {5000, 0.45, 1000, 4}};
+    const pal_surface_scene options = {
+        .label = -1, .adaptive = true, .shape = name, .material = {5000, 0.45, 1000, 4, 1}};
     *out = (pressed){.name = name, .axis = axis, .source = "procedural"};
     if (path) {
         snprintf(out->source, sizeof out->source, "%s", strrchr(path, '/') + 1);
