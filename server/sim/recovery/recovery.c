@@ -117,11 +117,12 @@ void pal_recovery_refresh(pal_recovery *r)
     if (pal_recovery_acts(r)) apply_regions(r);
 }
 
-void pal_recovery_transfer(pal_recovery *r, const pal_recovery *from)
+void pal_recovery_transfer(pal_recovery *r, const pal_recovery *from, bool same_supports)
 {
     if (r->model.n_element != from->model.n_element || r->n_edge != from->n_edge || r->n_node != from->n_node) return;
     memcpy(r->region, from->region, sizeof *r->region * (size_t)r->model.n_element);
     memcpy(r->of, from->of, sizeof r->of);
+    for (int p = 0; p < from->n_region; p++) r->of[p].fixed &= same_supports;
     const bool any = r->n_region > 0 || from->n_region > 0;
     r->n_region = from->n_region, r->was_bad = from->was_bad, r->bad_s = from->bad_s, r->tank_J = 0;
     r->debt_J = from->debt_J, r->counted_J = from->counted_J, r->seen_s = from->seen_s, r->touched = true;
@@ -467,15 +468,17 @@ static bool is_held(const pal_body *body, int node)
     return all;
 }
 
-/* which regions take the rotation of the supports */
+/* which changed regions take the rotation of the supports */
 static void fix(pal_recovery *r, const pal_body *body, bool changed)
 {
     double rotation[9];
     const bool known = pal_support_rotation(body, rotation);
-    for (int p = 0; p < r->n_region && changed; p++) r->of[p].fixed = 2 * r->of[p].n > r->model.n_element;
-    for (int n = 0; n < r->n_active && changed; n++)
-        for (int b = 0; b < 2; b++)
-            if (is_held(body, ends(r, r->active[n])[b])) r->of[r->edge_region[r->active[n]]].fixed = true;
+    for (int p = 0; p < r->n_region && changed; p++)
+        if (!r->of[p].stays) r->of[p].fixed = 2 * r->of[p].n > r->model.n_element;
+    for (int n = 0; n < r->n_active && changed; n++) {
+        pal_recovery_region *region = &r->of[r->edge_region[r->active[n]]];
+        for (int b = 0; b < 2; b++) region->fixed |= !region->stays && is_held(body, ends(r, r->active[n])[b]);
+    }
     for (int p = 0; p < r->n_region; p++) {
         r->of[p].fixed &= known;
         if (r->of[p].fixed) memcpy(r->of[p].rotation, rotation, sizeof rotation);

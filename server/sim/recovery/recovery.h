@@ -113,8 +113,9 @@ pal_err pal_recovery_make(const pal_recovery_model *model, int n_node, const dou
 void pal_recovery_reset(pal_recovery *r);
 /* constants of the elements have changed. NULL: nothing */
 void pal_recovery_refresh(pal_recovery *r);
-/* takes over the state of `from`, of the same elements; else nothing */
-void pal_recovery_transfer(pal_recovery *r, const pal_recovery *from);
+/* takes over the state of `from`, of the same elements; else nothing. Other supports may be turned against a region,
+ * which then keeps its best fit until its elements change, so that its energy does not rise */
+void pal_recovery_transfer(pal_recovery *r, const pal_recovery *from, bool same_supports);
 /* At the begin of a sub-step: examines the elements and chooses regions, G and s. Returns PAL_INVERTED while an element
  * is inverted or in a region, and PAL_INVERSION_* (effect.h). Counts in body->safeguards. NULL: 0 */
 unsigned pal_recovery_update(pal_recovery *r, pal_step *step);

@@ -95,7 +95,8 @@ static void transfer_recovery(pal_world *w, int b, const pal_world *before)
     if (!of[0] || !pal_recovery_acts(of[1])) return;
     if (to->n_node == from->n_node &&
         !memcmp(to->node_rest, from->node_rest, 3 * sizeof(double) * (size_t)to->n_node)) {
-        pal_recovery_transfer(of[0], of[1]);
+        const bool same = to->n_dof == from->n_dof && !memcmp(to->support, from->support, (size_t)to->n_dof);
+        pal_recovery_transfer(of[0], of[1], same);
         return;
     }
     pal_step step = {.body = to,
