@@ -55,12 +55,12 @@ static cJSON *job_json(const pal_robustness_job *job, const pal_robustness_optio
     return PAL_JSON(
         {"ok", JSON_BOOL(pal_robustness_job_good(job))}, {"name", JSON_TEXT(job->model[0] ? job->word : job->name)},
         {"model", JSON_TEXT(job->model)}, {"seed", JSON_NUMBER(options->seed)}, {"rests", JSON_BOOL(report->rests)},
-        {"settle_s", pal_json_finite(report->settle_s)}, {"lowest_1_s", pal_json_finite(report->lowest_1_s)},
-        {"tau_s", pal_json_finite(report->tau_s)}, {"cpu_s", pal_json_finite(report->took_s)},
-        {"passed", JSON_NUMBER(count[PAL_VERDICT_PASSED])}, {"slow", JSON_NUMBER(count[PAL_VERDICT_SLOW])},
-        {"collapsed", JSON_NUMBER(count[PAL_VERDICT_COLLAPSED])}, {"failed", JSON_NUMBER(count[PAL_VERDICT_FAILED])},
-        {"undecided", JSON_NUMBER(count[PAL_VERDICT_UNDECIDED])}, {"skipped", JSON_NUMBER(count[PAL_VERDICT_SKIPPED])},
-        {"cases", list});
+        {"rest_inverted", JSON_NUMBER(report->rest_inverted)}, {"settle_s", pal_json_finite(report->settle_s)},
+        {"lowest_1_s", pal_json_finite(report->lowest_1_s)}, {"tau_s", pal_json_finite(report->tau_s)},
+        {"cpu_s", pal_json_finite(report->took_s)}, {"passed", JSON_NUMBER(count[PAL_VERDICT_PASSED])},
+        {"slow", JSON_NUMBER(count[PAL_VERDICT_SLOW])}, {"collapsed", JSON_NUMBER(count[PAL_VERDICT_COLLAPSED])},
+        {"failed", JSON_NUMBER(count[PAL_VERDICT_FAILED])}, {"undecided", JSON_NUMBER(count[PAL_VERDICT_UNDECIDED])},
+        {"skipped", JSON_NUMBER(count[PAL_VERDICT_SKIPPED])}, {"cases", list});
 }
 
 /* "-" where there is no number */
@@ -99,11 +99,13 @@ static void print_job(const pal_robustness_job *job)
     char collapsed[40] = "", slow[40] = "";
     double max_s = 0;
     if (job->summary[0]) printf("%s\n", job->summary);
-    printf("%s: %s\n\n", job->title,
+    printf("%s: %s", job->title,
            report->rests    ? "comes to rest by itself"
            : report->driven ? "has a prescribed motion without end: compared with an unloaded run"
            : report->late   ? "does not come to rest by itself in the time"
                             : "does not come to rest by itself");
+    if (report->rest_inverted) printf(": its weight inverts %d elements", report->rest_inverted);
+    printf("\n\n");
     printf("%-11s %-10s %-4s %-9s %9s %8s %9s %9s %8s %8s %7s  %s\n", "case", "verdict", "safe", "recovered",
            "returns s", "force/cap", "energy +", "excluded", "% S left", "sim s", "cpu s", "what happened");
     for (int k = 0; k < report->n; k++)

@@ -103,9 +103,10 @@ typedef struct pal_robustness_result {
 } pal_robustness_result;
 
 typedef struct pal_robustness_report {
-    /* The scene comes to rest by itself. Otherwise the return cannot be judged, and cases that need it are
-     * undecided. */
-    bool rests, late; /* late: the processor time was over before it did */
+    /* The scene comes to rest by itself, nothing inverted. Otherwise the return cannot be judged, and cases that need
+     * it are undecided. */
+    bool rests, late;  /* late: the processor time was over before it did */
+    int rest_inverted; /* elements inverted at rest: a body does not bear its weight and lasting loads */
     /* it does not come to rest because a moving support drives it: it is compared with an undisturbed run */
     bool driven;
     double settle_s; /* simulated time until rest */

@@ -131,7 +131,10 @@ static pal_err run_all(pal_trial *trial, pal_robustness_report *out)
     if (o->progress && !o->progress("rest", 0, o->user)) return PAL_ERR_STATE;
     pal_trial_find_times(trial);
     out->lowest_1_s = trial->lowest_1_s, out->tau_s = trial->tau_s;
-    out->rests = trial->rests = pal_trial_settle(trial, &out->settle_s);
+    uint64_t none = UINT64_MAX;
+    trial->rests = pal_trial_settle(trial, &out->settle_s);
+    out->rest_inverted = trial->rest_inverted = pal_trial_count_inverted(trial, &none);
+    out->rests = trial->rests = trial->rests && trial->rest_inverted == 0;
     out->late = trial->rest_late = trial->late;
     /* a scene that did not come to rest because a support drives it is compared with an undisturbed run */
     if (!trial->rests && !trial->late && pal_world_find_component(trial->world, -1, "moving_support") >= 0)

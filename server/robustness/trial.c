@@ -269,8 +269,7 @@ bool pal_trial_run(pal_trial *trial, double seconds)
     return true;
 }
 
-/* Elements of bodies that have to return. Bodies whose elements are not on their own points count their recoveries. */
-static int count_inverted(const pal_trial *trial, uint64_t *n_recovery)
+int pal_trial_count_inverted(const pal_trial *trial, uint64_t *n_recovery)
 {
     int n = 0;
     uint64_t before = *n_recovery;
@@ -307,11 +306,11 @@ static pal_return_state watch_return(pal_trial *trial, double seconds, int *n_in
                              ? seconds
                              : pal_return_limit_s(trial->lowest_1_s, trial->tau_s, look.left_S, seconds);
     uint64_t n_recovery = 0;
-    *n_inverted = count_inverted(trial, &n_recovery);
+    *n_inverted = pal_trial_count_inverted(trial, &n_recovery);
     pal_return_watch_begin(&watch, trial->tau_s, limit);
     for (int i = 1; state == PAL_RETURN_OPEN && out->finite && !halted(trial) && !trial->late; i++) {
         if (!pal_trial_step(trial, trial->scene->step_s)) break;
-        if (i % EACH == 0) *n_inverted = count_inverted(trial, &n_recovery);
+        if (i % EACH == 0) *n_inverted = pal_trial_count_inverted(trial, &n_recovery);
         look = (pal_return_look){.time_s = out->simulated_s - begin,
                                  .left_S = pal_trial_deviation_S(trial, false),
                                  .speed_S_s = pal_trial_speed_S_s(trial),
@@ -354,7 +353,9 @@ void pal_trial_return(pal_trial *trial, double seconds)
     else if (!trial->rests && !trial->twin)
         pal_trial_report(trial, trial->rest_late ? PAL_CAUSE_SECONDS : PAL_CAUSE_NO_REST,
                          "not judged, the scene does not come to rest by itself%s",
-                         trial->rest_late ? " in the time" : "");
+                         trial->rest_late       ? " in the time"
+                         : trial->rest_inverted ? " without inverted elements"
+                                                : "");
     else if (state != PAL_RETURN_OPEN)
         pal_trial_report(trial, cause[state], "%s%.2g %% S from rest after %.1f s, %d elements inverted", how[state],
                          left, out->simulated_s, n_inverted);

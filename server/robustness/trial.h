@@ -28,11 +28,12 @@ typedef struct pal_trial {
     double base_J, scale_J, excess_J, allowed_J;
     double excluded_rise_J; /* sum of the rises that were not judged */
     int n_skip, since;
-    uint64_t count;  /* random numbers drawn */
-    bool rest_late;  /* the processor time was over before the scene was at rest */
-    bool rests;      /* the scene comes to rest by itself; otherwise the return cannot be judged */
-    unsigned causes; /* reported in this case, bit 1 << pal_cause */
-    bool slow;       /* the return was extrapolated to more than PAL_RETURN_TIME_S */
+    uint64_t count;    /* random numbers drawn */
+    bool rest_late;    /* the processor time was over before the scene was at rest */
+    int rest_inverted; /* elements that are inverted at rest, because a body does not bear its loads */
+    bool rests;        /* the scene comes to rest by itself, nothing inverted; else the return cannot be judged */
+    unsigned causes;   /* reported in this case, bit 1 << pal_cause */
+    bool slow;         /* the return was extrapolated to more than PAL_RETURN_TIME_S */
     bool may_stop[PAL_BODY_MAX], may_stay[PAL_BODY_MAX], stopped[PAL_BODY_MAX]; /* of each body */
     pal_err err;
 } pal_trial;
@@ -53,7 +54,10 @@ void pal_trial_find_times(pal_trial *trial); /* sets lowest_1_s and tau_s, in th
 /* a step with which bodies that creep come to rest soon: some tau_s where all solvers are implicit, else the scene's
  */
 double pal_trial_long_step_s(const pal_trial *trial);
-double pal_trial_speed_S_s(const pal_trial *trial);       /* largest RMS speed of a body over its S */
+double pal_trial_speed_S_s(const pal_trial *trial); /* largest RMS speed of a body over its S */
+/* Inverted elements of bodies that have to return. Bodies whose elements are not on their own points count their
+ * recoveries since n_recovery. */
+int pal_trial_count_inverted(const pal_trial *trial, uint64_t *n_recovery);
 bool pal_trial_settle(pal_trial *trial, double *took_s);  /* runs until nothing moves; false: it still does */
 void pal_trial_save(const pal_trial *trial, double **to); /* present positions of all bodies */
 bool pal_trial_back_to_rest(pal_trial *trial);

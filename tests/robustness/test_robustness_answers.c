@@ -74,10 +74,24 @@ static void a_stopped_body_is_not_safe(void)
     model_scene_close(&m);
 }
 
+/* too soft for its weight: no shape is judged against one that is crushed */
+static void what_its_weight_crushes_is_not_judged(void)
+{
+    pal_loaded_scene *loaded = generated_organ("thin-walled:7", "fem");
+    REQUIRE(loaded);
+    loaded->scene.body[0].material.young_Pa *= 0.01;
+    const pal_robustness_result *r = run(&loaded->scene, "flat");
+    printf("  %d elements inverted at rest: %s\n", report.rest_inverted, r->diag);
+    CHECK(!report.rests && report.rest_inverted > 0);
+    CHECK(r->verdict == PAL_VERDICT_UNDECIDED && r->safe == PAL_UNKNOWN && r->cause == PAL_CAUSE_NO_REST);
+    pal_scene_free(loaded);
+}
+
 int main(void)
 {
     RUN(no_model_is_pressed_with_more_than_the_cap);
     RUN(generated_organs_are_safe_and_recover_alike_each_time);
+    RUN(what_its_weight_crushes_is_not_judged);
     RUN(a_stopped_body_is_not_safe);
     return check_report();
 }

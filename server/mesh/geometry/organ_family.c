@@ -180,7 +180,7 @@ static const struct {
 } families[] = {{"slender", make_slender, true},
                 {"branched", make_branched, true},
                 {"thin-walled", make_thin, false},
-                {"lobed", make_lobed, false}};
+                {"lobed", make_lobed, true}};
 enum { N_FAMILY = sizeof families / sizeof families[0] };
 
 const char *pal_organ_family_name(int index)

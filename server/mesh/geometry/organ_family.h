@@ -7,9 +7,10 @@
  *
  * Each has 0 to 3 islands of 1 to 20 voxels beside it, above its middle. All components have genus 0. Box diagonal
  * 0.05 to 2 m, Young's modulus 1 to 50 kPa (with gravity above 9.8 kPa), supports on 5 to 30 % of the height; odd seeds
- * have gravity, and then the diagonal is at most E / (20 rho g), so that they bear their weight. Slender and branched
- * organs under gravity hang from their support: standing, they would buckle. The same name gives the same organ on
- * every machine (up to the rounding of its mathematical functions). Thread: [load]. */
+ * have gravity, and then the diagonal is at most E / (20 rho g), so that they bear their weight. All but
+ * thin-walled organs under gravity hang from their support: standing, they would buckle or be crushed at a neck. The
+ * same name gives the same organ on every machine (up to the rounding of its mathematical functions). Thread: [load].
+ */
 #ifndef PAL_MESH_GEOMETRY_ORGAN_FAMILY_H
 #define PAL_MESH_GEOMETRY_ORGAN_FAMILY_H
 #include "server/mesh/geometry/surface.h"
