@@ -101,11 +101,11 @@ static pal_err make_arrays(pal_compliance_solver *solver, pal_arena *arena)
 pal_err pal_compliance_solver_factor(pal_compliance_solver *solver, pal_block_matrix *blocks, bool later)
 {
     pal_system *system = solver->system;
-    double mass = system->mass, stiff = system->stiff, damp = system->damp;
+    const double mass = system->mass, stiff = system->stiff, viscous = system->viscous, damp = system->damp;
     pal_compliance_solver_reset(solver);
-    system->mass = 0, system->stiff = 1, system->damp = 0;
+    system->mass = 0, system->stiff = 1, system->viscous = system->damp = 0;
     pal_system_assemble(system, blocks);
-    system->mass = mass, system->stiff = stiff, system->damp = damp;
+    system->mass = mass, system->stiff = stiff, system->viscous = viscous, system->damp = damp;
     if (!later) return pal_warp_factor(&solver->warp, blocks);
     (void)pal_warp_refresh(&solver->warp, blocks, true);
     return PAL_ERR_OK;

@@ -27,6 +27,7 @@ static pal_err read_keys(pal_config_entry *item, const pal_build *build, pal_imp
     PAL_TRY(pal_entry_read_count(item, "iterations", 1, 100000, &out->iterations, build->diag));
     PAL_TRY(pal_entry_read_count(item, "newton", 1, 1000, &out->newton, build->diag));
     PAL_TRY(pal_entry_read_number(item, "substep_s", 0, 10, &out->substep_s, build->diag));
+    PAL_TRY(pal_entry_read_number(item, "stiffness_damping_s", 0, 10, &out->damping_s, build->diag));
     PAL_TRY(pal_entry_read_count(item, "refresh_iterations", 1, 100000, &out->refresh_iterations, build->diag));
     PAL_TRY(pal_entry_read_bool(item, "refresh", &out->refresh, build->diag));
     PAL_TRY(pal_entry_read_bool(item, "warp", &out->warp, build->diag));
@@ -61,11 +62,12 @@ static pal_err make_arrays(pal_implicit *core, pal_arena *arena)
     return made ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-/* factors of A = (1 + tau c) M + tau^2 K + tau D */
+/* factors of A = (1 + tau c) M + (tau^2 + tau beta) K + tau D */
 static void set_factors(pal_implicit *core, double tau)
 {
     core->system.mass = 1 + tau * pal_guard_drag_1_s(core->system.force, core->system.n_force);
     core->system.stiff = tau * tau;
+    core->system.viscous = tau * core->options.damping_s;
     core->system.damp = tau;
 }
 
@@ -143,7 +145,7 @@ static double contact_energy(pal_implicit *core)
     return 0.5 * pal_dot_product(core->cg.n, core->cg.z, q);
 }
 
-/* r = M (v* - V) + tau (f - c M V) + contact at V, the body being at x* + tau V; returns |M v* + tau f| */
+/* r = M (v* - V) + tau (f - c M V - beta K V) + contact at V, the body being at x* + tau V; returns |M v* + tau f| */
 static double residual(pal_implicit *core, double tau, const double *velocity, double *r)
 {
     const pal_body *body = core->system.body;
@@ -165,6 +167,7 @@ static double residual(pal_implicit *core, double tau, const double *velocity, d
         add_contact(core, tau, body->x, core->x0, q);
         for (int i = 0; i < core->cg.n; i++) r[i] -= q[i];
     }
+    if (core->system.viscous > 0) pal_system_multiply_stiffness(&core->system, -core->system.viscous, velocity, r);
     pal_system_clear_supported(body, b);
     pal_system_clear_supported(body, r);
     return norm(core, b);
@@ -183,7 +186,7 @@ static double interpolated_potential(pal_implicit *core, const double *velocity)
     return 0.5 * sum - pal_system_work(system, p);
 }
 
-/* the incremental potential at V where the body is now: kinetic + drag + rows - loads + contact, J */
+/* the incremental potential at V where the body is now: kinetic + drag + damping + rows - loads + contact, J */
 static double potential(pal_implicit *core, const double *velocity)
 {
     const pal_body *body = core->system.body;
@@ -196,6 +199,12 @@ static double potential(pal_implicit *core, const double *velocity)
             double slip = velocity[c] - core->vs[c];
             sum += m * (slip * slip + keep * velocity[c] * velocity[c]) - body->load[c] * (body->x[c] - core->x0[c]);
         }
+    }
+    if (core->system.viscous > 0) {
+        double *q = core->cg.q;
+        memset(q, 0, pal_body_bytes3(body));
+        pal_system_multiply_stiffness(&core->system, 0.5 * core->system.viscous, velocity, q);
+        sum += pal_dot_product(core->cg.n, velocity, q);
     }
     return core->system.has_contact ? sum + contact_energy(core) : sum;
 }
@@ -327,10 +336,9 @@ static void line_search(pal_implicit *core, double tau)
     core->report.step_size = step;
 }
 
-/* one Newton iteration with the residual at `start` in cg.r */
+/* one Newton iteration from `start`, where the forces are linearised and cg.r is the residual */
 static void iterate(pal_implicit *core, double tau, double target)
 {
-    pal_system_linearise(&core->system);
     pal_node_rotations_update(&core->rotations, &core->system);
     pal_warp_rotate(&core->warp, &core->rotations);
     memcpy(core->moved, core->cg.r, pal_body_bytes3(core->system.body));
@@ -405,6 +413,7 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
     for (int k = 0;; k++) {
         if (k > 0) memcpy(core->start, body->v, pal_body_bytes3(core->system.body));
         PAL_TRY(pal_assemble_forces(step));
+        if (k < max) pal_system_linearise(&core->system);
         double size = residual(core, tau, core->start, core->cg.r), left = norm(core, core->cg.r);
         if (k == 0) {
             core->reference = fmax(size, PAL_SOLVER_FLOOR * fmax(tau * load_size(core), left));

@@ -1,8 +1,8 @@
 /* Core shared by implicit_euler and sdirk2. A stage finds velocities V with
- *     M (V - v*) = tau (f(x* + tau V) - c M V),
- * where f is the force of all components and contact, and c the drag rate. Newton's method linearises the forces
- * about a state, so that V solves A V = b, A = (1 + tau c) M + tau^2 K + tau D, by conjugate gradients with the
- * warped factor of A at rest.
+ *     M (V - v*) = tau (f(x* + tau V) - c M V - beta K V),
+ * where f is the force of all components and contact, c the drag rate and beta the key stiffness_damping_s. Newton's
+ * method linearises the forces about a state, so that V solves A V = b, A = (1 + tau c) M + (tau^2 + tau beta) K + tau
+ * D, by conjugate gradients with the warped factor of A at rest.
  *
  * The first iteration starts from the state at the beginning of the stage, not from an extrapolated one. With the
  * rotations of that state the quadratic that is solved bounds the corotational energy (except its volume term) from
@@ -27,6 +27,7 @@ typedef struct pal_implicit_options {
     double tolerance;       /* 1e-2: residual of the stage's equations over |M v* + tau f|, Euclidean norm */
     int iterations, newton; /* 60: max conjugate gradient iterations per Newton iteration; 1: Newton iterations */
     double substep_s;       /* 0: no limit below the scene's step */
+    double damping_s;       /* 0: beta of damping forces -beta K v, which damp a mode w at the rate beta w^2 / 2 */
     int refresh_iterations; /* 12: a solve that takes more starts a new factor, if ... */
     bool refresh;           /* ... true                                                                    */
     bool warp;              /* true: the factor rotates with the body (false for comparison) */

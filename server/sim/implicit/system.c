@@ -204,7 +204,7 @@ double pal_system_inertia_norm2(const pal_system *system, double mass, double da
 void pal_system_multiply(const pal_system *system, const double *p, double *out)
 {
     pal_system_multiply_inertia(system, system->mass, system->damp, p, out);
-    pal_system_multiply_stiffness(system, system->stiff, p, out);
+    pal_system_multiply_stiffness(system, system->stiff + system->viscous, p, out);
     pal_system_multiply_contact(system, system->stiff, p, out);
     pal_system_clear_supported(system->body, out);
 }
@@ -252,7 +252,8 @@ static void assemble_interpolated(const pal_system *system, pal_block_matrix *to
 {
     const pal_body *body = system->body;
     const pal_interpolated_system *e = system->interpolated_system;
-    for (size_t i = 0; i < 9 * (size_t)to->start[to->n]; i++) to->value[i] = system->stiff * e->rest.value[i];
+    const double stiff = system->stiff + system->viscous;
+    for (size_t i = 0; i < 9 * (size_t)to->start[to->n]; i++) to->value[i] = stiff * e->rest.value[i];
     const pal_mass_operator *m = body->mass_operator;
     for (int i = 0; i < body->n_dof; i++) {
         for (int32_t k = m ? m->start[i] : 0; m && k < m->start[i + 1]; k++) {
@@ -277,7 +278,7 @@ static void assemble_nodes(const pal_system *system, pal_block_matrix *to)
     for (int i = 0; i < system->n_force; i++) {
         const pal_component *component = &system->force[i];
         if (component->effect->tangent && component->effect->tangent->assemble)
-            component->effect->tangent->assemble(component->self, system->stiff, to);
+            component->effect->tangent->assemble(component->self, system->stiff + system->viscous, to);
     }
 }
 

@@ -1,8 +1,9 @@
 /* The FORCE and CONTACT components of one body as one system of equations, which implicit solvers multiply, assemble
- * and search along. The operator is mass M + stiff K + damp D. K is that of the components' last linearise, M
- * the mass matrix, lumped or between control points (num/mass_operator.h, which has D, the damping between them). Rows
- * and columns of fixed dofs are omitted. Vectors are over dofs, [n_dof][3]. Where nodes are interpolated from control
- * points, a displacement is interpolated to the nodes and the result restricted. Thread: [load] to make, then [sim]. */
+ * and search along. The operator is mass M + (stiff + viscous) K + damp D, and stiff K of contact. K is that of the
+ * components' last linearise, M the mass matrix, lumped or between control points (num/mass_operator.h, which has D,
+ * the damping between them). Rows and columns of fixed dofs are omitted. Vectors are over dofs, [n_dof][3]. Where nodes
+ * are interpolated from control points, a displacement is interpolated to the nodes and the result restricted. Thread:
+ * [load] to make, then [sim]. */
 #ifndef PAL_SIM_IMPLICIT_SYSTEM_H
 #define PAL_SIM_IMPLICIT_SYSTEM_H
 #include "server/sim/implicit/interpolated_system.h"
@@ -14,11 +15,11 @@ typedef struct pal_system {
     int n_force, n_free;
     const pal_component *contact; /* of the present step; n_contact 0: none */
     int n_contact;
-    bool has_energy;          /* every FORCE component except drag reports its energy */
-    bool has_rotation;        /* some component reports rotations */
-    bool has_contact;         /* some CONTACT component has a tangent */
-    double mass, stiff, damp; /* coefficients of M, K, D */
-    double assemble_s;        /* time in pal_system_assemble and pal_system_probe */
+    bool has_energy;                   /* every FORCE component except drag reports its energy */
+    bool has_rotation;                 /* some component reports rotations */
+    bool has_contact;                  /* some CONTACT component has a tangent */
+    double mass, stiff, viscous, damp; /* coefficients of M, K (viscous: of damping proportional to K), D */
+    double assemble_s;                 /* time in pal_system_assemble and pal_system_probe */
 } pal_system;
 
 /* memory of a vector over dofs */
@@ -41,7 +42,7 @@ void pal_system_linearise(const pal_system *system); /* linearises the FORCE com
 void pal_system_linearise_contact(pal_system *system, const pal_step *step);
 /* rotation [n_dof][9] = sum of the components' rotations */
 void pal_system_rotate(const pal_system *system, double *rotation);
-/* out = (mass M + stiff K + damp D) p; p may be nonzero at fixed dofs, where out is 0 */
+/* the operator times p: out = A p; p may be nonzero at fixed dofs, where out is 0 */
 void pal_system_multiply(const pal_system *system, const double *p, double *out);
 /* out = (mass M + damp D) p */
 void pal_system_multiply_inertia(const pal_system *system, double mass, double damp, const double *p, double *out);

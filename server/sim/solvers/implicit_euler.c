@@ -2,8 +2,8 @@
  * one linearisation per step (newton 1) or more. First order, with numerical damping; contact and drag are implicit
  * too.
  *
- * Keys: tolerance (1e-2), iterations (60), newton (1), substep_s (0: the scene's step), refresh_iterations (12),
- * refresh (true), warp (true), watch (true); see implicit_solver.h. */
+ * Keys: tolerance (1e-2), iterations (60), newton (1), substep_s (0: the scene's step), stiffness_damping_s (0),
+ * refresh_iterations (12), refresh (true), warp (true), watch (true); see implicit_solver.h. */
 #include "server/sim/core/effect_list.h"
 #include "server/sim/implicit/implicit_solver.h"
 
