@@ -39,6 +39,7 @@ struct pal_bridge_net {
     bool touched; /* the device has rendered a force; it is reported once */
     pal_servo_view view;
     pal_servo_timing timing;
+    pal_hand_brush brush;
     struct {
         palpate_haptic_event_t event;
         int left;
@@ -112,6 +113,8 @@ static void ws_control(void *user, const pal_control *c)
         pal_log(PAL_LOG_INFO, "joined", "%s with tool %d", hello->session, hello->you_tool);
     }
     if (c->type == PAL_CONTROL_ERROR) pal_log(PAL_LOG_WARN, "server", "%s", c->error.text);
+    n->count.n_order_refused += c->type == PAL_CONTROL_ERROR && n->brush.under_way;
+    if (c->type == PAL_CONTROL_ERROR || c->type == PAL_CONTROL_ANSWER) pal_hand_brush_answered(&n->brush);
 }
 
 static void ws_message(void *user, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
@@ -132,6 +135,7 @@ static void ws_state(void *user, pal_link_state state, int code, const char *rea
 {
     pal_bridge_net *n = user;
     if (state != PAL_LINK_LOST && state != PAL_LINK_ENDED) return;
+    pal_hand_brush_reset(&n->brush);
     snprintf(n->count.reason, sizeof n->count.reason, "%d %.100s", code, reason);
     pal_log(PAL_LOG_WARN, "server", "connection lost: %d %s", code, reason);
 }
@@ -162,6 +166,18 @@ static pal_err net_publish(pal_bridge_net *n, const char *what, const lcm_type_i
     return pal_lcm_link_publish(n->lcm, n->o.session, what, n->o.tool, type, message);
 }
 
+/* commands of the brush, from where the tool is rendered; without one the button grasps */
+static void net_sculpt(pal_bridge_net *n, const pal_servo_view *v)
+{
+    pal_control c = {.type = PAL_CONTROL_COMMAND};
+    pal_hand_brush_move(&n->brush, v->buttons & PAL_WIRE_GRASP, v->position_m, v->n_proxy > 0 ? v->force_N : NULL);
+    if (!pal_hand_brush_take(&n->brush, &c.command)) return;
+    if (pal_link_send_control(n->link, &c))
+        pal_hand_brush_answered(&n->brush);
+    else
+        n->count.n_order++;
+}
+
 /* 250 Hz: newest pose and force to the server */
 static void net_send_pose(void *user)
 {
@@ -183,6 +199,8 @@ static void net_send_pose(void *user)
                           .model_seq = v->model_seq,
                           .model_age_us = v->model_age_us,
                           .model_stamp_us = v->model_stamp_us};
+    if (n->o.inside && !v->buttons) pose.flags |= PAL_WIRE_POSE_AWAY;
+    if (n->brush.kind) pose.buttons = 0, net_sculpt(n, v);
     pal_copy3(pose.position_m, v->position_m);
     memcpy(pose.quaternion, v->quat, sizeof pose.quaternion);
     for (int k = 0; k < 3; k++) {
@@ -334,6 +352,7 @@ pal_err pal_bridge_net_open(pal_link_loop *loop, pal_servo *servo, pal_servo_thr
     if (!n->o.servo.clock) n->o.servo.clock = &pal_clock_monotonic;
     n->count.tool = PAL_WIRE_TOOL_NONE;
     const bool bus = !strncmp(options->server, "lcm://", 6) || !strncmp(options->server, "udpm://", 7);
+    n->brush = options->brush;
     n->has_up = pal_unit3(n->up, options->up, 1e-9);
     if (!n->has_up) pal_set3(n->up, 0, 0, 1);
     /* the bus has no hello */

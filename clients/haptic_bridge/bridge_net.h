@@ -2,18 +2,21 @@
  * exchanges data with the servo only through triple buffers, a queue and flags. Thread: [net]. */
 #ifndef PAL_HAPTIC_BRIDGE_BRIDGE_NET_H
 #define PAL_HAPTIC_BRIDGE_BRIDGE_NET_H
+#include "clients/haptic_bridge/brush.h"
 #include "clients/haptic_bridge/servo_thread.h"
 #include "clients/link/link.h"
 
 typedef struct pal_bridge_net pal_bridge_net;
 
 typedef struct pal_bridge_net_options {
-    const char *server;      /* ws://host:port/ws or lcm://group:port?ttl=0; borrowed */
-    const char *session;     /* LCM: session name in the channels; borrowed */
-    const char *name;        /* of the member; borrowed                                 */
-    int tool;                /* index; with a websocket also PAL_WIRE_TOOL_ANY */
-    double up[3];            /* world direction of the device's up; 0 0 0: that of the scene, from hello */
-    bool has_origin;         /* the workspace stays at the origin in servo */
+    const char *server;   /* ws://host:port/ws or lcm://group:port?ttl=0; borrowed */
+    const char *session;  /* LCM: session name in the channels; borrowed */
+    const char *name;     /* of the member; borrowed                                 */
+    int tool;             /* index; with a websocket also PAL_WIRE_TOOL_ANY */
+    double up[3];         /* world direction of the device's up; 0 0 0: that of the scene, from hello */
+    bool has_origin;      /* the workspace stays at the origin in servo */
+    pal_hand_brush brush; /* what the grasp button does; with a websocket                        */
+    bool inside;          /* the tool touches nothing until it grasps, so that it grasps within the volume; the same */
     pal_servo_options servo; /* limits and workspace, for HCONFIG                       */
 } pal_bridge_net_options;
 
@@ -21,6 +24,7 @@ typedef struct pal_bridge_net_counts {
     bool joined; /* a server answered */
     int tool;
     uint64_t n_pose, n_model, n_refused, n_reconnect; /* reconnect: joined again after a loss */
+    uint64_t n_order, n_order_refused;                /* commands of the brush                */
     pal_jitter rtt;                                   /* own clock - echoed stamp - holding time of the server */
     char reason[128];
 } pal_bridge_net_counts;

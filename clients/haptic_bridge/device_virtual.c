@@ -45,10 +45,11 @@ static const virtual_hand virtual_hands[] = {
     {"off", 0, 0, 0, 0, 0},
 };
 
-typedef enum virtual_script { STILL, PRESS_HOLD, CYCLE, RAMP, STROKE, TAP, GRASP, SCRIPT_COUNT } virtual_script;
-static const char *const virtual_scripts[] = {"still", "press-hold", "cycle", "ramp", "stroke", "tap", "grasp"};
+typedef enum virtual_script { STILL, PRESS_HOLD, CYCLE, RAMP, STROKE, TAP, GRASP, SCULPT, SCRIPT_COUNT } virtual_script;
+static const char *const virtual_scripts[] = {"still",  "press-hold", "cycle", "ramp",
+                                              "stroke", "tap",        "grasp", "sculpt"};
 
-/* the script grasp: height that the hand intends at the end of each phase, and the phase's length */
+/* the scripts grasp and sculpt: height that the hand intends at the end of each phase, and the phase's length */
 static const struct {
     double up_m, seconds;
 } virtual_grasp[] = {
@@ -60,7 +61,7 @@ typedef struct virtual_state {
     const virtual_device *device;
     const virtual_hand *hand;
     virtual_script script;
-    double depth_m, height_m, wait_s, display_offset_s;
+    double depth_m, height_m, descent_m, wait_s, display_offset_s;
     double viscous, coulomb;
     const pal_clock *clock; /* that read advances to; NULL: only pal_virtual_advance does */
     pal_clock steps;
@@ -102,7 +103,7 @@ static void virtual_intend(virtual_state *s)
         const bool in_contact = pal_norm3(s->applied) > TOUCH_CONTACT_N;
         if (!in_contact && s->time_s > s->wait_s)
             s->xd[2] = fmax(s->xd[2] - APPROACH_M_S * SUB_STEP_S, -0.9 * s->device->radius_m);
-        if (s->n_contact >= TOUCH_TICKS) {
+        if (s->n_contact >= TOUCH_TICKS || s->xd[2] <= s->height_m - s->descent_m) {
             s->touched = true;
             s->touched_s = s->time_s;
             s->touched_z = s->xd[2];
@@ -118,7 +119,7 @@ static void virtual_intend(virtual_state *s)
         const double phase = fmod(t, 1.0), leg = s->depth_m / 0.3;
         down = phase < leg ? 0.3 * phase : fmax(s->depth_m - 0.3 * (phase - leg), -s->depth_m);
     }
-    if (s->script == GRASP) down = -virtual_grasp_up(s, t);
+    if (s->script == GRASP || s->script == SCULPT) down = -virtual_grasp_up(s, t);
     if (s->script == STROKE && t > 0.5) s->xd[1] = 0.02 * sin(3.14159265358979 * (t - 0.5));
     s->xd[2] = s->touched_z - down;
 }
@@ -192,6 +193,7 @@ static bool virtual_option(virtual_state *s, const char *key, const char *value)
     if (!strcmp(key, "height")) return s->height_m = number * 1e-3, true;
     if (!strcmp(key, "wait")) return s->wait_s = number, true;
     if (!strcmp(key, "fail")) return s->fail_at = (long)number, true;
+    if (!strcmp(key, "descent")) return s->descent_m = number * 1e-3, number >= 0;
     if (!strcmp(key, "lag")) return s->display_offset_s = number * 1e-3, number > 0;
     return false;
 }
@@ -242,6 +244,7 @@ static int virtual_open(void **handle, const char *id, pal_dev_info *out)
     s->script = PRESS_HOLD;
     s->depth_m = 0.008;
     s->height_m = 0.02;
+    s->descent_m = INFINITY;
     s->wait_s = 1.6;
     s->display_offset_s = 1e-3;
     s->clock = &pal_clock_monotonic;
@@ -283,7 +286,9 @@ static int virtual_read(void *handle, pal_dev_state *state)
     }
     *state = (pal_dev_state){.size = sizeof *state, .buttons = s->buttons};
     const int phase = atomic_load(&s->phase);
-    if (phase >= PAL_VIRTUAL_CLOSED && phase <= PAL_VIRTUAL_BACK) state->buttons |= PAL_DEVICE_BUTTON_GRASP;
+    /* sculpt lets go while it is up */
+    const int last = s->script == SCULPT ? PAL_VIRTUAL_HOLD : PAL_VIRTUAL_BACK;
+    if (phase >= PAL_VIRTUAL_CLOSED && phase <= last) state->buttons |= PAL_DEVICE_BUTTON_GRASP;
     memcpy(state->quat, s->quat, sizeof s->quat);
     const double q = s->device->step_m;
     for (int k = 0; k < 3; k++) state->position_m[k] = floor(s->x[k] / q) * q;

@@ -3,16 +3,22 @@
  * Deterministic in virtual time: the same calls give the same numbers.
  *
  * id: "touch" or "touch,key=value,..." with the devices touch premium omega3 inverse3 falcon and the keys
- *   hand    average light firm off       (average; off: no hand, a constant push of 0.5 N downward)
- *   script  still press-hold cycle ramp stroke tap grasp   (press-hold): intended motion of the hand along the device's
- * z. All but still first descend at 40 mm/s until a force of 0.1 N. Then press-hold: `depth` further down in 0.5 s,
- * hold; cycle: down and up at 1 Hz; ramp: down at depth / 6 s; stroke: press-hold, then 20 mm back and forth along y;
- * tap: down at 0.3 m/s and up, once a second; grasp: close the grasp 0.5 s after the touch, 30 mm up in 2 s, hold for 2
- * s, back in 2 s, let go and up depth   of the script, mm (8) height  start above the workspace centre, mm (20) wait
- * time at rest before the script, s, so that the bridge can arm (1.6) lag     actuator time constant, ms (1) clock wall
- * steps virtual (wall): wall: read advances to the present. steps: read advances by what the servo has slept on
- * pal_virtual_clock, so that a servo loop on a busy machine is slow and never late. virtual: only pal_virtual_advance
- * does fail    number of the first read that fails, like a broken cable; all later reads fail too (none) */
+ *   - hand: average light firm off (average; off: no hand, a constant push of 0.5 N downward)
+ *   - script: still press-hold cycle ramp stroke tap grasp sculpt (press-hold), the intended motion of the hand along
+ * the device's z. All but still first descend at 40 mm/s until a force of 0.1 N. Then
+ *     - press-hold: `depth` further down in 0.5 s, hold; cycle: down and up at 1 Hz; ramp: down at depth / 6 s
+ *     - stroke: press-hold, then 20 mm back and forth along y; tap: down at 0.3 m/s and up, once a second
+ *     - grasp: close the grasp 0.5 s after the touch, 30 mm up in 2 s, hold for 2 s, back in 2 s, let go and up
+ *     - sculpt: the same, but let go before it comes back
+ *   - depth: of the script, mm (8)
+ *   - height: start above the workspace centre, mm (20)
+ *   - descent: after so many mm the script goes on without a touch (no limit)
+ *   - wait: time at rest before the script, s, so that the bridge can arm (1.6)
+ *   - lag: actuator time constant, ms (1)
+ *   - clock: wall steps virtual (wall). wall: read advances to the present. steps: read advances by what the servo has
+ *     slept on pal_virtual_clock, so that a servo loop on a busy machine is slow and never late. virtual: only
+ *     pal_virtual_advance does
+ *   - fail: number of the first read that fails, like a broken cable; all later reads fail too (none) */
 #ifndef PAL_HAPTIC_BRIDGE_DEVICE_VIRTUAL_H
 #define PAL_HAPTIC_BRIDGE_DEVICE_VIRTUAL_H
 #include "clients/haptic_bridge/device.h"
@@ -24,7 +30,7 @@ const pal_haptic_v1 *pal_device_virtual(void);
 void pal_virtual_advance(void *handle, double dt_s);
 /* clock of a device with clock=steps, which advances as the one thread that sleeps on it does; else NULL. Borrowed */
 const pal_clock *pal_virtual_clock(void *handle);
-/* phase of the script grasp; with others always TOUCH. [any] */
+/* phase of the scripts grasp and sculpt; with others always TOUCH. [any] */
 typedef enum pal_virtual_phase {
     PAL_VIRTUAL_TOUCH,
     PAL_VIRTUAL_CLOSED,

@@ -18,7 +18,7 @@
 #include <unistd.h>
 
 typedef struct bridge {
-    const char *device, *tool, *hand, *script, *options;
+    const char *device, *tool, *hand, *script, *options, *brush;
     double seconds, leak_mW;
     bool list, doctor, stdin_stop;
     pal_flag_common common;
@@ -37,7 +37,7 @@ typedef struct bridge {
 } bridge;
 
 /* what --until may wait for, in the order of main_watch */
-static const char *const until_name[] = {"models", "poses", "force_N", "stale", "free"};
+static const char *const until_name[] = {"models", "poses", "force_N", "stale", "free", "orders"};
 
 /* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
 static pal_servo *_Atomic main_servo[2]; /* for the emergency stop */
@@ -70,8 +70,9 @@ static void main_watch(void *user)
     bridge *b = user;
     const pal_servo_view *v = pal_bridge_net_view(b->net);
     main_watch_grasp(b, v);
-    const double seen[] = {(double)v->n_model, (double)pal_bridge_net_count(b->net).n_pose, v->force_max_N,
-                           (double)v->n_stale, v->state == PAL_SERVO_FREE};
+    const double seen[] = {
+        (double)v->n_model,         (double)pal_bridge_net_count(b->net).n_pose, v->force_max_N, (double)v->n_stale,
+        v->state == PAL_SERVO_FREE, (double)pal_bridge_net_count(b->net).n_order};
     if (pal_end_condition_met(&b->until, seen)) pal_link_stop(b->loop);
 }
 
@@ -160,7 +161,8 @@ static cJSON *main_json(const bridge *b, const pal_servo_timing *t, const pal_se
         {"models_old", JSON_NUMBER(v->n_model_old)}, {"stale", JSON_NUMBER(v->n_stale)},
         {"faults", JSON_NUMBER(v->n_fault)}, {"not_finite", JSON_NUMBER(v->n_not_finite)},
         {"poses", JSON_NUMBER(c->n_pose)}, {"tool", JSON_NUMBER(c->tool)}, {"joined", JSON_BOOL(c->joined)},
-        {"reconnects", JSON_NUMBER(c->n_reconnect)}, {"position_m", cJSON_CreateDoubleArray(v->position_m, 3)});
+        {"reconnects", JSON_NUMBER(c->n_reconnect)}, {"orders", JSON_NUMBER(c->n_order)},
+        {"orders_refused", JSON_NUMBER(c->n_order_refused)}, {"position_m", cJSON_CreateDoubleArray(v->position_m, 3)});
 }
 
 static void main_table(const bridge *b, const pal_servo_timing *t, const pal_servo_view *v,
@@ -188,6 +190,9 @@ static void main_table(const bridge *b, const pal_servo_timing *t, const pal_ser
 static pal_err main_start(bridge *b, pal_diagnostic *diag)
 {
     pal_servo_options *o = &b->net_options.servo;
+    if (b->brush) PAL_TRY(pal_hand_brush_parse(b->brush, &b->net_options.brush, diag));
+    if ((b->brush || b->net_options.inside) && strncmp(b->net_options.server, "ws://", 5))
+        return PAL_REFUSE(diag, "%s needs a server by websocket", b->brush ? "--brush" : "--inside");
     b->net_options.tool = strcmp(b->tool, "any") ? atoi(b->tool) : PAL_WIRE_TOOL_ANY;
     PAL_TRY(main_workspace(b, diag));
     PAL_TRY(main_open_device(b, diag));
@@ -327,12 +332,18 @@ int main(int argc, char **argv)
         {"--tool", "N", PAL_FLAG_TEXT, &b.tool, 0, 0, "tool to take: index or any; LCM: index (any, 0)"},
         {"--hand", "NAME", PAL_FLAG_TEXT, &b.hand, 0, 0, "virtual: average | light | firm | off"},
         {"--script", "NAME", PAL_FLAG_TEXT, &b.script, 0, 0,
-         "virtual: still | press-hold | cycle | ramp | stroke | tap | grasp (ends by itself)"},
-        {"--options", "K=V,...", PAL_FLAG_TEXT, &b.options, 0, 0, "virtual: depth, height mm, wait s, lag ms, clock"},
+         "virtual: still | press-hold | cycle | ramp | stroke | tap | grasp | sculpt (both end by themselves)"},
+        {"--options", "K=V,...", PAL_FLAG_TEXT, &b.options, 0, 0,
+         "virtual: depth, height, descent mm, wait s, lag ms, clock"},
+        {"--brush", "KIND,...", PAL_FLAG_TEXT, &b.brush, 0, 0,
+         "the grasp button sculpts: inflate | curve | paint | extrude, radius=MM (20), strength=Pa, N/m or factor "
+         "(2000, 200, 2)"},
+        {"--inside", NULL, PAL_FLAG_SWITCH, &net->inside, 0, 0,
+         "the tool passes through the surface, and grasps within the volume"},
         {"--rate", "HZ", PAL_FLAG_NUMBER, &servo->rate_hz, 500, 4000, "servo rate (1000)"},
         {"--seconds", "S", PAL_FLAG_NUMBER, &b.seconds, 0.1, 86400, "end after this time (never)"},
         {"--until", "NAME=N,...", PAL_FLAG_TEXT, &b.until_text, 0, 0,
-         "end before that once all is reached: models, poses, force_N, stale, free=1"},
+         "end before that once all is reached: models, poses, force_N, stale, free=1, orders"},
         {"--force-cap", "N", PAL_FLAG_NUMBER, &servo->force_cap_N, 0, 20, "largest force (3, and the device's peak)"},
         {"--origin", "X,Y,Z", PAL_FLAG_VECTOR, servo->origin_m, 0, 0, "world place of the workspace's centre, m"},
         {"--up", "X,Y,Z", PAL_FLAG_VECTOR, net->up, 0, 0,

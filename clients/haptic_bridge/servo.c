@@ -42,8 +42,8 @@ struct pal_servo {
     uint64_t last_arrival_ns;
     uint32_t delay_generation;
     /* the rest belongs to [servo] */
-    servo_model model; /* the newest; empty: none */
-    uint64_t last_ns, rest_ns;
+    servo_model model;                  /* the newest; empty: none */
+    uint64_t last_ns, rest_ns, both_ns; /* both: since when both buttons are held, 0: they are not */
     double gap_s[SERVO_GAPS];
     int n_gap;
     bool first, estop_latched, lost, stale, was_stale, at_wall;
@@ -368,9 +368,22 @@ static void servo_toward(double *value, double wanted, double step)
     *value = wanted > *value ? fmin(wanted, *value + step) : fmax(wanted, *value - step);
 }
 
+/* both buttons together are what a frightened hand does, and no way of working */
+static void servo_watch_buttons(pal_servo *s, uint64_t now)
+{
+    const uint32_t both = PAL_DEVICE_BUTTON_GRASP | PAL_DEVICE_BUTTON_CLUTCH;
+    if ((s->device.buttons & both) != both)
+        s->both_ns = 0;
+    else if (s->both_ns == 0)
+        s->both_ns = now;
+    else if ((double)(now - s->both_ns) * 1e-9 >= ESTOP_HOLD_S)
+        atomic_store(&s->estop, true);
+}
+
 /* latches and states; true: forces may be rendered this tick */
 static bool servo_states(pal_servo *s, uint64_t now, double dt)
 {
+    servo_watch_buttons(s, now);
     if (atomic_exchange(&s->estop, false) && !s->estop_latched) {
         s->estop_latched = true;
         s->view.state = PAL_SERVO_ESTOP;

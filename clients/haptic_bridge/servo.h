@@ -15,8 +15,8 @@
  *     counts from when it was made: time since its arrival, and its delay above the least usual one. Force fades out
  * over 500 ms under 3 N s/m damping; FREE without a model (0.5 N s/m) follows. A new model fades in over 250 ms or as
  * the tank allows.
- *   - ESTOP and FAULT give no force until re-armed. E-stop is latched. A fault of speed, number or stalled loop re-arms
- *     by the conditions of ARMING, and so does a lost device when it answers again.
+ *   - ESTOP and FAULT give no force until re-armed. E-stop is latched; both buttons held for 0.5 s are one. A fault of
+ * speed, number or stalled loop re-arms by the conditions of ARMING, and so does a lost device when it answers again.
  *
  * Limits: |F| <= cap, rising by at most cap / 10 ms and falling without limit. An rms over 10 s above the device's
  * continuous rating scales force down. Stiffness of a contact or a grasp <= device limit / (scale force_scale), 300 N/m

@@ -27,8 +27,15 @@
 /* s, m/s. Rest of the handle before forces start */
 #define ARM_REST_S    0.5
 #define ARM_SPEED_M_S 0.05
+#define ESTOP_HOLD_S  0.5  /* s. Both buttons held so long are the emergency stop */
 #define BAD_READS_MAX 2    /* failed reads in a row: the device is lost */
 #define NO_FORCE_N    0.01 /* the workspace may move below this */
+
+/* ---- sculpting (test_hand_brush) ---- */
+
+#define BRUSH_DAB           0.5  /* of the radius between two dabs of paint: they overlap by half */
+#define BRUSH_STEP          0.05 /* of the radius by which the hand moves before a force follows: 1 mm of 20 */
+#define BRUSH_EXTRUDE_MIN_M 1e-3 /* a lower cell is a slip of the hand */
 
 /* ---- limits (test_servo) ---- */
 

@@ -36,7 +36,7 @@ stop $job
 check "and latched" "$(grep -c 'state estop;' "$work/stop")" == 1
 
 # the server goes while it presses: models stale, force gone
-presses gone --until stale=1,free=1
+presses gone --until force_N=0.06,stale=1,free=1
 check "a third one presses" $? == 0
 kill "$server_job"
 wait "$server_job" 2>/dev/null

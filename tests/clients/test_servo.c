@@ -319,6 +319,26 @@ static void emergency_stop_takes_force_away_within_two_ticks_and_stays(void)
     rig_close(&r);
 }
 
+static void both_buttons_held_for_half_a_second_are_an_emergency_stop(void)
+{
+    trial r;
+    REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
+    rig_run(&r, 4);
+    CHECK(rig_force(&r) > 0.1);
+    const double upright[4] = {1, 0, 0, 0};
+    for (int turn = 0; turn < 2; turn++) {
+        pal_virtual_set_handle(r.device, PAL_DEVICE_BUTTON_DEADMAN | PAL_DEVICE_BUTTON_GRASP | PAL_DEVICE_BUTTON_CLUTCH,
+                               upright);
+        rig_run(&r, turn ? 0.51 : 0.45);
+        CHECK((r.view.state == PAL_SERVO_ESTOP) == (turn == 1));
+        pal_virtual_set_handle(r.device, PAL_DEVICE_BUTTON_DEADMAN, upright);
+        rig_run(&r, 1);
+    }
+    CHECK_INT(r.view.state, PAL_SERVO_ESTOP);
+    CHECK_NEAR(rig_force(&r), 0, 0);
+    rig_close(&r);
+}
+
 static void force_keeps_its_cap_and_rises_no_faster_than_the_cap_in_10_ms(void)
 {
     trial r;
@@ -708,6 +728,7 @@ int main(void)
     RUN(jitter_makes_nothing_stale_and_a_longer_way_becomes_the_usual_one);
     RUN(surface_of_a_late_model_moves_on_from_when_it_was_made);
     RUN(emergency_stop_takes_force_away_within_two_ticks_and_stays);
+    RUN(both_buttons_held_for_half_a_second_are_an_emergency_stop);
     RUN(force_keeps_its_cap_and_rises_no_faster_than_the_cap_in_10_ms);
     RUN(continuous_rating_scales_a_long_push_down);
     RUN(stiffness_above_the_device_is_rendered_at_its_clamp);

@@ -136,8 +136,7 @@ void pal_box_tree_destroy(pal_box_tree *tree)
     PAL_FREE(tree->nodes, tree->item, tree);
 }
 
-/* solid angle of a triangle (van Oosterom & Strackee 1983); 0 from a point in its plane */
-static double solid_angle(const double *corner[3], const double p[3])
+double pal_solid_angle(const double *corner[3], const double p[3])
 {
     double a[3], b[3], c[3], cross[3];
     pal_sub3(a, corner[0], p);
@@ -169,7 +168,7 @@ double pal_box_tree_winding(const pal_box_tree *tree, const double p[3])
             for (int i = 0; i < n->n_item; i++) {
                 const double *c[3];
                 corners_of(tree->surface, tree->item[n->right + i], c);
-                sum += solid_angle(c, p);
+                sum += pal_solid_angle(c, p);
             }
         }
     }

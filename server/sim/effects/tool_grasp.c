@@ -1,7 +1,8 @@
 /* Component tool_grasp: each tool grasps tissue by a damped spring (grasp.h).
  *
  * When the grasp button goes down the shown vertices within `reach` of the tool are grasped with weights (1 -
- * d^2/R^2)^2, or only the nearest one if it lies within 1.5 reach; the skin turns these into node weights. On an
+ * d^2/R^2)^2, or only the nearest one if it lies within 1.5 reach; the skin turns these into node weights. Farther from
+ * the surface, within the volume, the nodes within reach are grasped in the same way (paper A, section 3.3). On an
  * adaptive body weights are also proportional to node mass, so that fine and coarse parts move alike, and a grasp
  * persists when nodes are added or removed (adaptive_grasp.h). Tissue is released when the button goes up or the
  * tool's ramp is 0.
@@ -12,6 +13,7 @@
  *
  * Keys: stiffness_N_m (0: 16 E reach), damping_s (0.01: c over k), reach_m (0: 2 tool radii). */
 #include "server/base/vec3.h"
+#include "server/mesh/geometry/box_tree.h"
 #include "server/sim/contact/grasp.h"
 #include "server/sim/contact/tuning.h"
 
@@ -123,6 +125,34 @@ static bool find_vertices(pal_grasps *grasps, pal_grasp *g, const pal_body *body
     return nearest >= 0;
 }
 
+/* does the shown surface surround p? Its solid angle there is then 4 pi */
+static bool is_inside(const pal_body *body, const double p[3])
+{
+    const pal_surface *s = body->display.surface;
+    double sum = 0;
+    for (int t = 0; t < s->n_tri; t++) {
+        double x[3][3];
+        for (int k = 0; k < 9; k++)
+            x[k / 3][k % 3] = (double)body->display.shown[3 * (size_t)s->tri[3 * t + k / 3] + k % 3];
+        sum += pal_solid_angle((const double *[]){x[0], x[1], x[2]}, p);
+    }
+    return fabs(sum) > 2 * M_PI;
+}
+
+/* weights of the nodes around a tool that is within the volume, farther from the surface */
+static bool find_nodes(pal_grasps *grasps, const pal_body *body, const double p[3], double reach)
+{
+    bool any = false;
+    if (!is_inside(body, p)) return false;
+    for (int i = 0; i < body->n_node; i++) {
+        const double d = pal_dist3(body->d + 3 * (size_t)i, p) / reach, fall = 1 - d * d;
+        if (!(fall > 0)) continue;
+        grasps->gather[i] = fall * fall;
+        any = true;
+    }
+    return any;
+}
+
 /* takes nodes and weights from gather and sets it to 0 */
 static void take_gathered(pal_grasps *grasps, pal_grasp *g, const pal_body *body)
 {
@@ -145,7 +175,10 @@ static void close_grasp(pal_grasps *grasps, pal_grasp *g, const pal_tool *tool, 
 {
     double last[3], y[3], reach = pal_grasp_reach_m(grasps, tool);
     pal_sub3(last, tool->last.position_m, body->offset_m);
-    if (!find_vertices(grasps, g, body, body->display.shown, last, reach)) return;
+    if (!find_vertices(grasps, g, body, body->display.shown, last, reach)) {
+        g->by_vertex = false;
+        if (g->adaptive || !find_nodes(grasps, body, last, reach)) return;
+    }
     if (g->adaptive) {
         pal_adaptive_grasp_begin(g->adaptive, body, tool->last.quat, g->share);
         pal_adaptive_grasp_weights(body, g->share, grasps->gather);

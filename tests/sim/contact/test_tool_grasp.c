@@ -210,6 +210,39 @@ static void shares_tissue_between_tools(void)
     tool_scene_close(&s);
 }
 
+/* a tool in the middle of a ball takes hold of what is around it: the force acts there and not on the surface */
+static void takes_hold_within_the_volume(void)
+{
+    tool_scene s;
+    REQUIRE(ball_scene(&s, 8, true, 1, 0.006, 15) && tool_scene_open(&s));
+    move_tool(&s, 0, 0, 0, 0, true);
+    REQUIRE(step_world(&s, 2));
+    CHECK(tool_of(&s, 0)->holding);
+    double at_rest[3];
+    pal_copy3(at_rest, tool_of(&s, 0)->force_N);
+    for (int i = 1; i <= 60; i++) {
+        move_tool(&s, 0, 0.0001 * i, 0, 0, true);
+        REQUIRE(step_world(&s, 1));
+        double load[3];
+        sum_loads(s.body, load);
+        for (int c = 0; c < 3; c++) CHECK_NEAR(load[c], -tool_of(&s, 0)->force_N[c], 1e-9);
+    }
+    double inner = 0;
+    for (int i = 0; i < s.body->n_node; i++) {
+        const double *rest = s.body->node_rest + 3 * i, moved = s.body->d[3 * i] - rest[0];
+        if (pal_norm3(rest) < 0.012) inner = fmax(inner, moved);
+        if (pal_norm3(rest) > 0.045) CHECK(pal_norm3(s.body->load + 3 * i) == 0);
+    }
+    const double *f = tool_of(&s, 0)->mean_force_N;
+    printf("  tool 6 mm aside: %.3g N (%.2g at first), the middle %.3g mm\n", f[0], pal_norm3(at_rest), 1e3 * inner);
+    CHECK(f[0] < -0.1 && -f[0] > 0.95 * pal_norm3(f));
+    CHECK(inner > 0.003);
+    move_tool(&s, 0, 0.006, 0, 0, false);
+    REQUIRE(step_world(&s, 2));
+    CHECK(!tool_of(&s, 0)->holding);
+    tool_scene_close(&s);
+}
+
 int main(void)
 {
     RUN(begins_without_a_jump_and_pulls_tissue_along);
@@ -221,5 +254,6 @@ int main(void)
     RUN(never_exceeds_its_cap);
     RUN(tells_the_bridge_a_force_and_a_stiffness_that_agree);
     RUN(shares_tissue_between_tools);
+    RUN(takes_hold_within_the_volume);
     return check_report();
 }
