@@ -2,7 +2,7 @@
  * exchanges data with the servo only through triple buffers, a queue and flags. Thread: [net]. */
 #ifndef PAL_HAPTIC_BRIDGE_BRIDGE_NET_H
 #define PAL_HAPTIC_BRIDGE_BRIDGE_NET_H
-#include "clients/haptic_bridge/brush.h"
+#include "clients/haptic_bridge/hand_brush.h"
 #include "clients/haptic_bridge/servo_thread.h"
 #include "clients/link/link.h"
 

@@ -1,5 +1,5 @@
 /* Which commands the motion of a device makes of a brush. */
-#include "clients/haptic_bridge/brush.h"
+#include "clients/haptic_bridge/hand_brush.h"
 #include "tests/check.h"
 
 #include <math.h>

@@ -2,7 +2,7 @@
  *
  * When the grasp button goes down the shown vertices within `reach` of the tool are grasped with weights (1 -
  * d^2/R^2)^2, or only the nearest one if it lies within 1.5 reach; the skin turns these into node weights. Farther from
- * the surface, within the volume, the nodes within reach are grasped in the same way (paper A, section 3.3). On an
+ * the surface, within the volume, the nodes within reach are grasped in the same way (paper A section 3.3). On an
  * adaptive body weights are also proportional to node mass, so that fine and coarse parts move alike, and a grasp
  * persists when nodes are added or removed (adaptive_grasp.h). Tissue is released when the button goes up or the
  * tool's ramp is 0.

@@ -1,4 +1,4 @@
-/* Sculpting by the device (paper A, section 4.1): while the grasp button is held, the motion of the tip becomes
+/* Sculpting by the device (paper A section 4.1): while the grasp button is held, the motion of the tip becomes
  * commands of the protocol (protocol/README.md, "Sculpting"). x: the tip; p: where the button went down; n: outwards
  * there, the direction of the contact's force.
  *
@@ -10,8 +10,8 @@
  *
  * A stroke begins while the tip touches. One command is under way at a time: dabs wait in a queue, a force that was not
  * sent yet is replaced by the newer one. Thread: one. */
-#ifndef PAL_HAPTIC_BRIDGE_BRUSH_H
-#define PAL_HAPTIC_BRIDGE_BRUSH_H
+#ifndef PAL_HAPTIC_BRIDGE_HAND_BRUSH_H
+#define PAL_HAPTIC_BRIDGE_HAND_BRUSH_H
 #include "protocol/control.h"
 #include "server/base/err.h"
 

@@ -1,4 +1,4 @@
-#include "clients/haptic_bridge/brush.h"
+#include "clients/haptic_bridge/hand_brush.h"
 #include "clients/haptic_bridge/tuning.h"
 #include "server/base/vec3.h"
 
