@@ -339,7 +339,8 @@ void pal_trial_return(pal_trial *trial, double seconds)
     const double before = pal_trial_extent_S(trial);
     const pal_return_state state = watch_return(trial, seconds, &n_inverted);
     const double after = pal_trial_extent_S(trial), left = 100 * out->deviation_S;
-    if (out->finite && !out->frozen && !(after <= 1.5 * fmax(before, 1)))
+    /* on its way back it may be larger for a while: a return that is cut short is not judged */
+    if (state != PAL_RETURN_OPEN && out->finite && !out->frozen && !(after <= 1.5 * fmax(before, 1)))
         pal_trial_report(trial, PAL_CAUSE_BOUNDS, "grew to %.2g S", after);
     trial->slow = state == PAL_RETURN_SLOW;
     if (state != PAL_RETURN_OPEN) trial->late = false; /* it was judged in the last step of its time */
