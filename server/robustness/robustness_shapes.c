@@ -200,7 +200,15 @@ static activity measure_activity(const pal_trial *trial)
     return sum;
 }
 
-/* runs until a quarter of a second moves nothing by more than 1e-8 S, for as long as the largest time constant needs */
+static bool is_settled(const pal_trial *trial)
+{
+    bool all = true;
+    for (int b = 0; b < trial->scene->n_body; b++) all = all && pal_world_is_settled(trial->world, b);
+    return all;
+}
+
+/* runs until a quarter of a second moves nothing by more than 1e-8 S and no component will change anything by itself,
+ * for as long as the largest time constant needs */
 static bool settle_loaded(pal_trial *trial, double *ms)
 {
     const double step = pal_trial_long_step_s(trial), begin = trial->out->simulated_s,
@@ -213,7 +221,7 @@ static bool settle_loaded(pal_trial *trial, double *ms)
             if (!pal_trial_step(trial, step)) return false;
         double now = pal_trial_cpu_s(), done_s = trial->out->simulated_s - begin;
         *ms = 1e3 * (now - before) / all;
-        if (drift_S(trial) <= 1e-8 || done_s > max_s) return true;
+        if ((drift_S(trial) <= 1e-8 && is_settled(trial)) || done_s > max_s) return true;
         trial->late = now > late;
         if (trial->late) {
             trial->out->needs_s = 2 * (now - before) * max_s / done_s;

@@ -44,6 +44,15 @@ pal_err pal_assemble_forces(pal_step *step)
     return PAL_ERR_OK;
 }
 
+bool pal_components_change(const pal_component *component, int n, double time_s)
+{
+    for (int i = 0; i < n; i++) {
+        const pal_effect *effect = component[i].effect;
+        if (effect->sleep.settled_s && !(time_s >= effect->sleep.settled_s(component[i].self))) return true;
+    }
+    return false;
+}
+
 double pal_components_energy_J(const pal_component *component, int n, const pal_body *body)
 {
     double sum = 0;

@@ -232,6 +232,8 @@ typedef enum pal_forces { PAL_FORCES_ALL, PAL_FORCES_PACKED, PAL_FORCES_INTERNAL
 /* Runs these components. Adds to each component's spent_ns. [sim] */
 pal_err pal_run_forces(pal_step *step, pal_forces which);
 double pal_components_energy_J(const pal_component *component, int n, const pal_body *body); /* sum of n. [sim] */
+/* does one of n still change at this time without outside action (sleep.settled_s)? [sim] */
+bool pal_components_change(const pal_component *component, int n, double time_s);
 /* d = A x; f = load plus the forces of all components; g = A' f. Fixed dofs have forces too: what their support bears.
  * [sim] */
 pal_err pal_assemble_forces(pal_step *step);

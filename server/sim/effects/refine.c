@@ -10,7 +10,8 @@
  *
  * Departures. The paper has one threshold for both directions and flickers at it. Here a face keeps its state for
  * dwell_s, also where a finer neighbour would have it split, so that it switches at most 1/dwell_s times a second. A
- * face that was joined too early waits up to 8 times as long the next time. A node with a lasting load is not removed.
+ * face that was joined too early waits up to 8 times as long the next time; if it is then joined too early again while
+ * the loads have not changed, it stays split until they do. A node with a lasting load is not removed.
  * New nodes first relax towards equilibrium with the others fixed, while they store more energy than there was before:
  * a bent coarse face has no strain, but its finer springs would.
  * The changes of one evaluation are one switch, which conserves energy, momentum and angular momentum. The stiffness
@@ -53,15 +54,18 @@ typedef struct refine {
     int max_node;
 
     struct {
-        double clock_s, wait_s;    /* simulated since reset; until the next evaluation              */
-        double seen_s, seen_load2; /* clock and sum of squared loads at the last one                */
-        double moved_m;            /* bound of the displacement since then                          */
-        double spring_s, shape_s;  /* remaining blend of each factor to 1                           */
+        double clock_s, wait_s;        /* simulated since reset; until the next evaluation              */
+        double seen_s, seen_load2;     /* clock and sum of squared loads at the last one                */
+        double moved_m;                /* bound of the displacement since then                          */
+        double steady_s, steady_load2; /* since when that sum has been the same, and its value       */
+        double spring_s, shape_s;      /* remaining blend of each factor to 1                           */
     } time;
     bool deferred;                /* the last evaluation had requests deferred by dwell_s                */
     bool seen_twice;              /* nothing had moved since the one before, and it changed nothing      */
     uint64_t seen_revision;       /* 0: there was no evaluation                                    */
-    uint8_t *backoff;             /* log2 of the factor on a face's waiting time before it is joined [n faces] */
+    uint8_t *backoff;             /* log2 of the factor on a face's waiting time before it is joined; HELD: it is not,
+                                   * while the loads are the same [n faces] */
+    bool holds;                   /* a face is HELD                                                      */
     double *switched_s;           /* time of a face's last switch [n faces] */
     uint8_t *action;              /* request of each leaf of the list, or of its parent [n_slot] */
     double *mass_was;             /* values before the switch, valid where `seen` is its number [n_vertex] */
@@ -72,7 +76,7 @@ typedef struct refine {
     pal_refine_history report;
 } refine;
 
-enum { MAX_BACKOFF = 3, MAX_RELAX = 8 };
+enum { MAX_BACKOFF = 3, HELD = MAX_BACKOFF + 1, MAX_RELAX = 8 };
 
 /* ---- load ---- */
 
@@ -85,7 +89,7 @@ static void clear(refine *state)
     }
     memset(&state->time, 0, sizeof state->time);
     state->seen_revision = 0;
-    state->deferred = state->seen_twice = false;
+    state->deferred = state->seen_twice = state->holds = false;
     memset(state->seen, 0, sizeof *state->seen * (size_t)levels->n_vertex[levels->n_level - 1]);
     state->report = (pal_refine_history){0};
     memcpy(state->measure.frame.quat, (double[4]){1}, sizeof state->measure.frame.quat);
@@ -149,28 +153,42 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     return PAL_ERR_OK;
 }
 
+/* ---- requests from the present state ---- */
+
+/* the loads have changed: no face is HELD any longer */
+static void let_go(refine *state)
+{
+    const pal_levels *levels = &state->adaptive->levels;
+    for (int32_t f = 0; f < levels->first_face[levels->n_level] && state->holds; f++)
+        if (state->backoff[f] == HELD) state->backoff[f] = MAX_BACKOFF;
+    state->holds = false;
+}
+
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
 {
     (void)body, (void)diag;
     derive(self, to);
+    let_go(self);
     return PAL_ERR_OK;
 }
-
-/* ---- requests from the present state ---- */
 
 /* true: the face has kept its state long enough */
 static bool settled(const refine *state, int32_t face)
 {
     bool split = state->adaptive->face_state[face] == PAL_FACE_SPLIT;
     return state->time.clock_s - state->switched_s[face] >=
-           ldexp(state->dwell_s, split ? state->backoff[face] : 0) * (1 - 1e-9);
+           (split && state->backoff[face] == HELD
+                ? INFINITY
+                : ldexp(state->dwell_s, split ? state->backoff[face] : 0) * (1 - 1e-9));
 }
 
-/* a split soon after a join doubles the face's waiting time */
+/* A split soon after a join doubles the face's waiting time; under the same loads the longest is not waited twice */
 static void note_split(refine *state, int32_t face)
 {
     const bool early = state->time.clock_s - state->switched_s[face] < ldexp(state->dwell_s, MAX_BACKOFF);
-    state->backoff[face] = early ? (uint8_t)fmin(state->backoff[face] + 1, MAX_BACKOFF) : 0;
+    const bool steady = state->time.steady_s < state->switched_s[face];
+    state->backoff[face] = early || steady ? (uint8_t)fmin(state->backoff[face] + 1, steady ? HELD : MAX_BACKOFF) : 0;
+    state->holds |= state->backoff[face] == HELD;
     state->switched_s[face] = state->time.clock_s;
 }
 
@@ -248,7 +266,7 @@ static bool find_requests(refine *state, const pal_body *body)
         else if (parent >= 0 && pal_adaptive_can_join(adaptive, parent) && wants_join(state, body, parent))
             action = JOIN;
         const bool now = action == SPLIT ? may_split(state, leaf) : action == NOTHING || settled(state, parent);
-        state->deferred |= !now;
+        state->deferred |= !now && !(action == JOIN && state->backoff[parent] == HELD);
         state->action[k] = (uint8_t)(now ? action : NOTHING);
         any |= state->action[k] != NOTHING;
     }
@@ -478,6 +496,10 @@ static pal_err run(void *self, pal_step *step)
     if (same && state->time.clock_s - state->time.seen_s < state->dwell_s) return PAL_ERR_OK;
     state->seen_revision = step->body->display.revision + 1, state->time.seen_s = state->time.clock_s;
     state->time.seen_load2 = load2, state->time.moved_m = 0;
+    if (fabs(load2 - state->time.steady_load2) > STEADY_LOADS * load2) {
+        state->time.steady_s = state->time.clock_s, state->time.steady_load2 = load2;
+        let_go(state);
+    }
     pal_refine_mark_nodes(&state->measure, adaptive, step->body, &state->limits);
     const uint64_t n_switch = state->report.n_switch;
     if (find_requests(state, step->body)) change(state, step);
@@ -514,6 +536,7 @@ static void transfer(void *self, const pal_body *body, const void *before, const
     memcpy(state->switched_s, was->switched_s, n_face * sizeof *state->switched_s);
     memcpy(state->backoff, was->backoff, n_face * sizeof *state->backoff);
     state->time = was->time;
+    state->holds = was->holds;
     state->seen_revision = was->seen_revision == by->from->display.revision + 1 ? body->display.revision + 1 : 0;
     memcpy(state->measure.frame.quat, was->measure.frame.quat, sizeof state->measure.frame.quat);
 }

@@ -59,14 +59,6 @@ static bool slow(const sleeper *row, const pal_body *body)
     return all;
 }
 
-/* true: a component still changes without outside action */
-static bool changes(const pal_component *row, int n, double time_s)
-{
-    for (int i = 0; i < n; i++)
-        if (row[i].effect->sleep.settled_s && !(time_s >= row[i].effect->sleep.settled_s(row[i].self))) return true;
-    return false;
-}
-
 static const float *shown_vertex(const pal_body *body, int k)
 {
     return body->display.shown + 3 * (size_t)(body->active ? body->active[k] : k);
@@ -180,9 +172,10 @@ static pal_err run(void *self, pal_step *step)
     bool same = row->revision == body->display.revision;
     row->revision = body->display.revision;
     row->boxed = false;
-    bool at_rest = same && !body->frozen && slow(row, body) && !changes(step->force, step->n_force, step->time_s) &&
-                   !changes(step->contact, step->n_contact, step->time_s) &&
-                   !changes(step->adapt, step->n_adapt, step->time_s) && !tool_near(row, step);
+    bool at_rest = same && !body->frozen && slow(row, body) &&
+                   !pal_components_change(step->force, step->n_force, step->time_s) &&
+                   !pal_components_change(step->contact, step->n_contact, step->time_s) &&
+                   !pal_components_change(step->adapt, step->n_adapt, step->time_s) && !tool_near(row, step);
     row->at_rest_s = at_rest ? row->at_rest_s + step->dt_s : 0;
     /* slightly less, so that rounding in a sum of steps does not add one */
     if (row->at_rest_s < row->rest_time_s * (1 - 1e-9)) return PAL_ERR_OK;

@@ -460,6 +460,17 @@ const pal_tools *pal_world_tools(const pal_world *world)
     return &world->tools;
 }
 
+bool pal_world_is_settled(const pal_world *world, int body)
+{
+    static const pal_stage stages[] = {PAL_STAGE_FORCE, PAL_STAGE_CONTACT, PAL_STAGE_ADAPT};
+    const pal_plan *plan = &world->plan;
+    for (size_t i = 0; i < sizeof stages / sizeof *stages; i++)
+        if (pal_components_change(plan->component + plan->first[stages[i]][body], plan->n_of[stages[i]][body],
+                                  pal_world_time_s(world)))
+            return false;
+    return true;
+}
+
 bool pal_world_solve_report(const pal_world *world, int body, pal_solve_report *out)
 {
     const pal_component *solve = &world->plan.component[world->plan.first[PAL_STAGE_SOLVE][body]];

@@ -130,6 +130,8 @@ void pal_world_invalidate_limits(pal_world *world,
 const pal_component *pal_world_component(const pal_world *world,
                                          int index); /* the component itself, in the plan's order */
 const pal_tools *pal_world_tools(const pal_world *world);
+/* would no component of the body change by itself from now on, were it at rest? */
+bool pal_world_is_settled(const pal_world *world, int body);
 /* report of a body's solver; false: it gives none */
 bool pal_world_solve_report(const pal_world *world, int body, pal_solve_report *out);
 #endif

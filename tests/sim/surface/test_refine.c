@@ -415,6 +415,41 @@ static void never_flickers(void)
     HARD_CASE("threshold", "adaptive_springs", what, max_switches(sweeps, 240, true), 5, "");
 }
 
+/* switches of a pinched sphere after 8 s, and nodes that stay refined when it is let go */
+static void pinch_for_long(double force_N, uint64_t *n_late, int *n_left)
+{
+    shell_scene s;
+    take_sphere(&s);
+    thresholds(&s, 0, 0, 4);
+    pal_entry_put_number(shell_scene_effect(&s, "viscous"), "rate_1_s", 10, NULL);
+    REQUIRE(shell_scene_start(&s));
+    const int coarse = s.body->n_active;
+    pinch(&s, force_N);
+    steps(&s, 8);
+    CHECK(s.body->n_active > coarse);
+    const uint64_t early = report_of(&s)->n_switch;
+    steps(&s, 4);
+    *n_late = report_of(&s)->n_switch - early;
+    pinch(&s, 0);
+    steps(&s, 4);
+    *n_left = s.body->n_active - coarse;
+    shell_scene_close(&s);
+}
+
+/* under these loads a join bends the surface until the face splits again, which repeats for ever with a dwell time
+ * alone */
+static void comes_to_rest_under_a_lasting_load(void)
+{
+    static const double force_N[] = {0.0395, 0.0779, 0.0873};
+    for (size_t k = 0; k < sizeof force_N / sizeof *force_N; k++) {
+        uint64_t n_late = 1;
+        int n_left = -1;
+        pinch_for_long(force_N[k], &n_late, &n_left);
+        CHECK_INT(n_late, 0);
+        CHECK_INT(n_left, 0);
+    }
+}
+
 static void a_node_that_bears_a_lasting_load_is_not_taken_away(void)
 {
     shell_scene s;
@@ -671,6 +706,7 @@ int main(void)
     RUN(goes_back_to_the_coarse_mesh_and_repeats_bit_by_bit);
     RUN(reset_goes_back_to_the_start_level);
     RUN(never_flickers);
+    RUN(comes_to_rest_under_a_lasting_load);
     RUN(a_node_that_bears_a_lasting_load_is_not_taken_away);
     RUN(thresholds_follow_a_live_edit_of_the_material);
     RUN(a_frozen_body_keeps_its_levels);
