@@ -64,9 +64,8 @@ static void collapse(pal_world *world, int tick)
 
 static void a_collapsed_and_a_tumbling_body_have_their_golden_hash(void)
 {
-    /* as springs alone open again by their weight, and without it by their recovery: the first is as it was before
-     * there was that */
-    static const uint64_t golden[] = {0x08f13457f5082aa2u, 0xcdb3f0a0d631e1dfu};
+    /* springs alone open again by their weight, and without it by their recovery */
+    static const uint64_t golden[] = {0x75cfd6c9bd424b85u, 0xcdb3f0a0d631e1dfu};
     for (int recover = 0; recover < 2; recover++) {
         pal_prepared box;
         REQUIRE(!box_make(4, 3, 3, 0.01, &box));
@@ -104,7 +103,7 @@ static void a_pressed_and_grasped_block_has_its_golden_hash(void)
     pal_entry_init(&def->effect[def->n_effect++], "effects[3]", "tool_grasp");
     pal_tools_default(scene, 2);
     scene->tool[0].radius_m = scene->tool[1].radius_m = 0.006;
-    CHECK(run(&box, scene, press_and_grasp, 100) == 0x107d6a125e375bacu);
+    CHECK(run(&box, scene, press_and_grasp, 100) == 0x0491b604d7845c08u);
 }
 
 /* our stomach, held at one end, on three levels: pressed at the front and grabbed beside it, both let go; levels come

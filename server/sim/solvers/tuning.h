@@ -9,6 +9,10 @@
  * fixed part of the node's period, so that this is a damping ratio of half a percent at every length of sub-step
  * (tests/sim/world/test_world.c) */
 #define PAL_HEAVY_LOSS 0.01
+/* verlet: while a node moves by more than PAL_GUARD_MOVE in each sub-step, one in so many finds the bound again. It
+ * changes by a tenth from one to the next then, and `safety` leaves a factor of two of stability
+ * (tests/stability/test_springs_cases.c) */
+enum { PAL_FAST_SUBSTEPS = 4 };
 /* static_newton: operations of a factor per entry that are worth one iteration with it, a product and two triangular
  * passes (tests/sim/solvers/test_fem_static.c) */
 enum { PAL_FACTOR_FLOPS_PER_ENTRY = 20 };
