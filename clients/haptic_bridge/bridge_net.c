@@ -32,7 +32,8 @@ struct pal_bridge_net {
     double radius_m;
     uint32_t generation, pose_seq, echo_seq, model_newest, event_seq, status_seq;
     uint64_t joined_ns, model_ns, n_status;
-    bool placed; /* the place of the workspace is known */
+    bool placed;           /* the place of the workspace is known */
+    bool counts_from_here; /* the next model is the first of its session */
     bool has_up;
     double up[3]; /* of the device, in the world */
     pal_workspace_frame frame;
@@ -52,7 +53,10 @@ static void net_model(pal_bridge_net *n, const pal_wire_haptic *model)
 {
     n->count.n_model++;
     n->model_ns = pal_clock_ns();
-    n->model_newest = model->seq;
+    const int32_t ahead = (int32_t)(model->seq - n->model_newest);
+    if (n->counts_from_here || ahead > 0) n->model_newest = model->seq;
+    if (!n->counts_from_here && ahead > 1) n->count.n_model_lost += (uint64_t)ahead - 1;
+    n->counts_from_here = false;
     const uint64_t now_us = n->model_ns / 1000, back_us = model->echo_stamp_us + model->hold_us;
     if (model->echo_seq != 0 && model->echo_seq != n->echo_seq && back_us <= now_us) {
         n->echo_seq = model->echo_seq;
@@ -91,6 +95,7 @@ static void net_joined(pal_bridge_net *n)
 {
     n->generation++;
     n->echo_seq = 0;
+    n->counts_from_here = true;
     n->count.n_reconnect += n->count.joined;
     n->count.joined = true;
     if (!n->joined_ns) n->joined_ns = pal_clock_ns();
@@ -277,6 +282,13 @@ static void net_send_config(pal_bridge_net *n)
     net_publish(n, "HCONFIG", palpate_haptic_config_t_get_type_info(), &config);
 }
 
+/* part of the models that did not come in order */
+static float net_lost(const pal_bridge_net_counts *c)
+{
+    const uint64_t n = c->n_model + c->n_model_lost;
+    return n ? (float)((double)c->n_model_lost / (double)n) : 0;
+}
+
 /* 10 Hz: health; 1 Hz: limits */
 static void net_send_status(void *user)
 {
@@ -305,6 +317,7 @@ static void net_send_status(void *user)
         .rtt_ms = {(float)pal_jitter_at_us(&n->count.rtt, 0.5) / 1e3f,
                    (float)pal_jitter_at_us(&n->count.rtt, 0.99) / 1e3f, (float)((double)n->count.rtt.max_ns * 1e-6)},
         .model_hz = seconds > 0 ? (float)((double)n->count.n_model / seconds) : 0,
+        .model_lost = net_lost(&n->count),
         .model_age_ms = (float)v->model_age_us * 1e-3f,
         .jump_max_N = (float)v->jump_max_N,
         .force_rms_N = (float)v->force_rms_N,

@@ -24,6 +24,7 @@ typedef struct pal_bridge_net_counts {
     bool joined; /* a server answered */
     int tool;
     uint64_t n_pose, n_model, n_refused, n_reconnect; /* reconnect: joined again after a loss */
+    uint64_t n_model_lost;                            /* numbers between two models that did not come in order */
     uint64_t n_order, n_order_refused;                /* commands of the brush                */
     pal_jitter rtt;                                   /* own clock - echoed stamp - holding time of the server */
     char reason[128];

@@ -158,11 +158,12 @@ static cJSON *main_json(const bridge *b, const pal_servo_timing *t, const pal_se
         {"max_step_N", JSON_NUMBER(v->jump_max_N)}, {"generated_mJ", JSON_NUMBER(v->generated_mJ)},
         {"tank_mJ", JSON_NUMBER(v->tank_mJ)}, {"grasp", grasp_json(b)},
         {"felt_N_m", JSON_NUMBER(v->rendered_stiffness_N_m)}, {"models", JSON_NUMBER(v->n_model)},
-        {"models_old", JSON_NUMBER(v->n_model_old)}, {"stale", JSON_NUMBER(v->n_stale)},
-        {"faults", JSON_NUMBER(v->n_fault)}, {"not_finite", JSON_NUMBER(v->n_not_finite)},
-        {"poses", JSON_NUMBER(c->n_pose)}, {"tool", JSON_NUMBER(c->tool)}, {"joined", JSON_BOOL(c->joined)},
-        {"reconnects", JSON_NUMBER(c->n_reconnect)}, {"orders", JSON_NUMBER(c->n_order)},
-        {"orders_refused", JSON_NUMBER(c->n_order_refused)}, {"position_m", cJSON_CreateDoubleArray(v->position_m, 3)});
+        {"models_old", JSON_NUMBER(v->n_model_old)}, {"models_lost", JSON_NUMBER(c->n_model_lost)},
+        {"stale", JSON_NUMBER(v->n_stale)}, {"faults", JSON_NUMBER(v->n_fault)},
+        {"not_finite", JSON_NUMBER(v->n_not_finite)}, {"poses", JSON_NUMBER(c->n_pose)}, {"tool", JSON_NUMBER(c->tool)},
+        {"joined", JSON_BOOL(c->joined)}, {"reconnects", JSON_NUMBER(c->n_reconnect)},
+        {"orders", JSON_NUMBER(c->n_order)}, {"orders_refused", JSON_NUMBER(c->n_order_refused)},
+        {"position_m", cJSON_CreateDoubleArray(v->position_m, 3)});
 }
 
 static void main_table(const bridge *b, const pal_servo_timing *t, const pal_servo_view *v,

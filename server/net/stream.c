@@ -142,7 +142,8 @@ void pal_stream_transfer(pal_stream *stream, const pal_stream *before)
     stream->step_ms = before->step_ms, stream->step_rate_hz = before->step_rate_hz;
     memcpy(stream->component_ms, before->component_ms, sizeof stream->component_ms);
     stream->count = before->count;
-    stream->haptic_seq = before->haptic_seq, stream->field_seq = before->field_seq;
+    memcpy(stream->haptic_seq, before->haptic_seq, sizeof stream->haptic_seq);
+    stream->field_seq = before->field_seq;
     stream->rate_tick = before->rate_tick, stream->rate_ns = before->rate_ns;
     for (int p = 0; p < stream->n_part && p < before->n_part; p++) {
         pal_stream_part *part = &stream->part[p];
@@ -293,7 +294,7 @@ static void put_haptic(pal_stream *s, int i, uint64_t now_ns, const pal_stream_t
         return;
     }
     pal_wire_haptic w = {.tool = (uint16_t)i,
-                         .seq = ++s->haptic_seq,
+                         .seq = ++s->haptic_seq[i],
                          .flags =
                              (s->frame->paused ? PAL_WIRE_HAPTIC_FREEZE : 0) | (frozen ? PAL_WIRE_HAPTIC_FORCE_OFF : 0),
                          .stamp_us = now_ns / 1000,

@@ -59,7 +59,7 @@ typedef struct pal_stream {
     uint8_t *buffer;            /* [cap] */
     size_t cap;
     double force_error2_N2[PAL_TOOL_MAX]; /* mean square of a device's force less the server's, of a second */
-    uint32_t haptic_seq;
+    uint32_t haptic_seq[PAL_TOOL_MAX];    /* of the newest contact model of each tool */
     uint64_t field_seq;
     uint64_t rate_tick, rate_ns;
     int n_component; /* of the last frame */

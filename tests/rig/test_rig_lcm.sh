@@ -35,8 +35,10 @@ through() {
 }
 
 for profile in lan 20 50 80 150 200; do through $profile models=40,poses=200,force_N=0.06; done
+check "200: lost models are counted" "$(json models_lost "$work/bridge_200")" '>=' 1
 # 300 models come before the outage at most
 through outage models=420,stale=1,force_N=0.06
+check "outage: and those that it took" "$(json models_lost "$work/bridge_outage")" '>=' 1
 check "outage: the models of the bridge get stale" "$(json stale "$work/bridge_outage")" '>=' 1
 # models are stale after 0.5 s at most, the force has faded 0.5 s later, and a damping of 0.5 N s/m is left (README.md of
 # the bridge); a line may be half written; an age of more than an hour is that of no model
@@ -46,4 +48,19 @@ check "outage: then nothing but damping is felt (N)" "$(awk "$free"' { over = $2
     END { print max + 0 }' "$work/force_outage")" '<' 0.001
 check "outage: force is felt again" "$(awk 'NF == 4 { if ($1 > 1.01 && $1 < 3600) gap = 1; else if (gap && $2 > max) max = $2 }
     END { print max + 0 }' "$work/force_outage")" '>' 0.05
+
+# two devices at one bridge, each with a tool and channels of its own
+start_server --port 0 --lcm "udpm://$bus:7667?ttl=0" --log info
+shows "$work/serve.err" "$server_job" lcm_joined
+timeout 120 "$bin/palpate-bridge" --server "udpm://$bus:7667?ttl=0" --session ball --tool 0 --origin 0,0,0.048 \
+    --device "$(device premium)" --second-device "$(device premium)" --seconds 110 --until models=300,poses=200,force_N=0.06 \
+    --json >"$work/two" 2>"$work/two.err"
+check "two devices: the bridge ends well" $? == 0
+sed 's/.*"second"://' "$work/two" >"$work/second"
+for hand in two second; do
+    check "$hand: its models come" "$(json models "$work/$hand")" '>=' 40
+    check "$hand: its force is felt (N)" "$(json force_max_N "$work/$hand")" '>=' 0.06
+done
+check "the second hand has the next tool" "$(json tool "$work/second")" == 1
+stop "$server_job"
 finish
