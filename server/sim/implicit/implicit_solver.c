@@ -419,7 +419,7 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
             core->reference = fmax(size, PAL_SOLVER_FLOOR * fmax(tau * load_size(core), left));
             core->reference = fmax(core->reference, tau * negligible_N(body) * sqrt(body->n_dof));
         }
-        double best = core->options.tolerance * core->reference;
+        double best = core->options.tolerance * (core->turns_back ? PAL_TURNING_SLACK : 1) * core->reference;
         to->residual = core->reference > 0 ? left / core->reference : 0;
         to->converged = k > 0 && left <= best;
         if (to->converged || k == max || !isfinite(left)) {
@@ -481,7 +481,8 @@ bool pal_implicit_begin(pal_implicit *core, pal_step *step)
         return false;
     }
     pal_system_interpolate(&core->system);
-    (void)pal_guard_recover(step);
+    const unsigned seen = pal_guard_recover(step);
+    core->turns_back = (seen & PAL_INVERTED) && !(seen & PAL_INVERSION_AT_REST);
     if (step->sub == 0) core->report.n_newton = core->report.n_cg = 0;
     core->max_cg = 0;
     core->energy_rose = false;

@@ -50,6 +50,7 @@ typedef struct pal_implicit {
     double tau_rest_s;           /* tau for which the factor at rest was made */
     double density;              /* of the material, kg/m^3             */
     double reference;            /* residual norm that the tolerance scales, N s */
+    bool turns_back;             /* inverted elements move, at the beginning of the sub-step */
     double start_energy_J;       /* at the beginning of the sub-step */
     bool guarded;                /* energy is checked, see above */
     bool sound;                  /* the last check found x and v finite */
