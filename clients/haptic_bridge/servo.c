@@ -262,8 +262,8 @@ static void servo_move_frame(pal_servo *s)
 /* The force that the device gives: what it tells where that is a part of the command, because it limits or filters */
 static const double *servo_given(const pal_servo *s)
 {
-    const double *told = s->device.force_N, *to = s->force_prev;
-    return s->device.has_force && pal_dot3(told, to) >= 0 && pal_norm3(told) <= pal_norm3(to) ? told : to;
+    const double *reported = s->device.force_N, *to = s->force_prev;
+    return s->device.has_force && pal_dot3(reported, to) >= 0 && pal_norm3(reported) <= pal_norm3(to) ? reported : to;
 }
 
 /* Work of the hand on the device since the last pose. The motors follow a command one tick and MOTOR_TIME_S late: a

@@ -16,7 +16,8 @@ static cJSON *as_json(const pal_replay_report *r, double seconds)
                     {"commands", JSON_NUMBER(r->n_command)}, {"hashes", JSON_NUMBER(r->n_hash)},
                     {"hashes_equal", JSON_NUMBER(r->n_hash_equal)},
                     {"first_difference", equal ? cJSON_CreateNull() : JSON_NUMBER(r->first_difference)},
-                    {"last_hash", JSON_TEXT(hash)}, {"seconds", JSON_NUMBER(seconds)});
+                    {"last_hash", JSON_TEXT(hash)}, {"cut", r->cut[0] ? JSON_TEXT(r->cut) : cJSON_CreateNull()},
+                    {"seconds", JSON_NUMBER(seconds)});
 }
 
 static bool show(void *user, const pal_world *world, double fraction)
@@ -28,11 +29,17 @@ static bool show(void *user, const pal_world *world, double fraction)
 
 int command_replay(int argc, char **argv)
 {
+    bool strict = false;
+    const pal_flag flag[] = {
+        {"--strict", NULL, PAL_FLAG_SWITCH, &strict, 0, 0, "refuse a log that is cut or damaged"},
+    };
     const pal_flag_table table = {
         .usage = "replay LOG SCENE [flags]",
         .about =
             "Runs an input log (palpate serve --record LOG) again and compares the hash of the state after each step.\n"
-            "SCENE is the scene that was served. Exit code 1 when a hash differs.\n",
+            "SCENE is the scene that was served. A log that was cut by a crash is replayed up to its last whole\n"
+            "record. Exit code 1 when a hash differs.\n",
+        PAL_FLAGS(flag),
         .example = "palpate prepare --procedural -o organ\n"
                    "palpate serve organ/scene.json --record organ.log --port 0 --seconds 2\n"
                    "palpate replay organ.log organ/scene.json\n",
@@ -47,10 +54,13 @@ int command_replay(int argc, char **argv)
     double start = pal_clock_s();
     const pal_replay_watch watch = {show, &common};
     pal_err err = pal_scene_input_open(word[1], &input, &diag);
+    if (!err && strict) err = pal_replay_run(word[0], NULL, NULL, &report, &diag);
+    if (!err && strict && report.cut[0]) err = PAL_REFUSE(&diag, "%s", report.cut);
     if (!err) err = pal_replay_run(word[0], input.studied.scene, &watch, &report, &diag);
     pal_report_progress(NULL, 0, &common);
     pal_scene_input_close(&input);
     if (err) return pal_report_refusal(&common, err, &diag);
+    if (report.cut[0]) fprintf(stderr, "palpate replay: %s; replayed up to there\n", report.cut);
     bool equal = report.n_hash == report.n_hash_equal;
     if (!equal)
         fprintf(stderr, "palpate replay: %s: the world differs from step %llu on: %llu of %llu hashes are equal\n",

@@ -1,6 +1,6 @@
-/* `palpate serve`: every input becomes a session, the network thread serves them, this thread waits for signals. SIGINT
- * and SIGTERM shut down in order; SIGCHLD reports a palpate-lcm that has died and is restarted. LCM has a process of
- * its own because two forged datagrams can crash any LCM subscriber.
+/* `palpate serve`: every input becomes a session, the network thread serves them, this thread waits for signals.
+ * SIGINT, SIGTERM and SIGHUP shut down in order; SIGCHLD reports a palpate-lcm that has died and is restarted. LCM has
+ * a process of its own because two forged datagrams can crash any LCM subscriber.
  *
  * Signals have handlers instead of a blocked mask and sigwait: OpenBLAS starts threads before main, and a signal that
  * one thread does not block is delivered to that thread. Without a handler it is then discarded where it is ignored
@@ -202,7 +202,7 @@ static int announce(const serve_run *run)
 
 /* ---- signals ---- */
 
-static const int handled_signal[] = {SIGINT, SIGTERM, SIGCHLD};
+static const int handled_signal[] = {SIGINT, SIGTERM, SIGHUP, SIGCHLD};
 enum { N_HANDLED = sizeof handled_signal / sizeof *handled_signal };
 static sem_t woken; /* posted by each handled signal and by the end of the network thread */
 static atomic_bool stop_asked;
@@ -367,7 +367,7 @@ static pal_err run_all(serve_run *run, pal_diagnostic *diag)
 static const char about[] =
     "Serves every scene (.json), surface (.obj .stl .ply .off), label volume (.nii .nii.gz .inr .inr.gz) or solid\n"
     "of control cells (.palcells) as a session that browsers, haptic bridges and scripted clients share; without\n"
-    "an input a computed organ. Prints the address to open. Ends on SIGINT or SIGTERM, or after --seconds.\n";
+    "an input a computed organ. Prints the address to open. Ends on SIGINT, SIGTERM or SIGHUP, or after --seconds.\n";
 
 int command_serve(int argc, char **argv)
 {
@@ -418,6 +418,12 @@ int command_serve(int argc, char **argv)
     pal_report_progress(NULL, 0, &run.common);
     for (int i = 0; i < run.n; i++) make_unique(&run, i);
     if (!err) err = run_all(&run, &diag);
+    for (int i = 0; i < run.n && !err; i++) {
+        const int error = run.session[i] ? pal_session_record_error(run.session[i]) : 0;
+        if (error)
+            err = pal_diagnostic_set(&diag, PAL_ERR_IO, "the recording of %s ended before it: %s",
+                                     run.scene[i]->scene.name, strerror(error));
+    }
     pal_server_close(run.server);
     for (int i = 0; i < run.n; i++) pal_session_close(run.session[i]);
     for (int i = 0; i < run.n; i++) pal_studied_scene_close(&run.studied[i]);

@@ -1,6 +1,7 @@
 /* Replays a recording and takes the loads from it. */
 #include "server/commands/recorded_input.h"
 
+#include "server/base/log.h"
 #include "server/cli/report.h"
 
 typedef struct watch {
@@ -23,6 +24,7 @@ static pal_err replay(watch *w, const char *log, pal_recorded_input *out, pal_di
         if (pal_load_recorder_create(scene, w->n_body, &w->recorder[w->n_body]))
             return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the loads of a recording");
     PAL_TRY(pal_replay_run(log, scene, &(pal_replay_watch){step, w}, &out->replay, diag));
+    if (out->replay.cut[0]) pal_log(PAL_LOG_WARN, "record", "%s; used up to there", out->replay.cut);
     int largest = 0;
     for (int b = 0; b < w->n_body; b++) pal_load_recorder_stop(w->recorder[b]);
     for (int b = 1; b < w->n_body; b++)

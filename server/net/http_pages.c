@@ -29,10 +29,25 @@ static void get_health(pal_hub *hub, pal_reply *reply)
     reply_plain(reply, alive ? 200 : 503, alive ? "ok\n" : "a simulation has stalled\n");
 }
 
+/* sessions that were to be recorded and are not any longer; *error: errno of the first */
+static int count_record_errors(const pal_hub *hub, int *error)
+{
+    int n = 0;
+    for (int r = hub->n_room - 1; r >= 0; r--) {
+        const int now = pal_session_record_error(hub->room[r].session);
+        if (now) n++, *error = now;
+    }
+    return n;
+}
+
 /* assets are built before the first request */
 static void get_ready(pal_hub *hub, pal_reply *reply)
 {
-    reply_plain(reply, hub->leaving ? 503 : 200, hub->leaving ? "ending\n" : "ready\n");
+    int error = 0;
+    char text[160];
+    const int n_error = count_record_errors(hub, &error);
+    snprintf(text, sizeof text, "a recording has ended: %s\n", strerror(error));
+    reply_plain(reply, hub->leaving || n_error ? 503 : 200, hub->leaving ? "ending\n" : n_error ? text : "ready\n");
 }
 
 static void get_sessions(pal_hub *hub, pal_reply *reply)
@@ -89,6 +104,8 @@ static void get_metrics(pal_hub *hub, pal_reply *reply)
     const pal_hub_count *n = &hub->count;
     double step_s = 0, late = 0, encode_s = 0, n_encode = 0, frame_byte = 0, delta_byte = 0;
     int role[PAL_WIRE_ROLE_COUNT] = {0};
+    int record_error = 0;
+    const int n_record_error = count_record_errors(hub, &record_error);
     for (int r = 0; r < hub->n_room; r++) {
         const pal_hub_room *room = &hub->room[r];
         const pal_stream *s = room->stream;
@@ -104,6 +121,7 @@ static void get_metrics(pal_hub *hub, pal_reply *reply)
     const metric rows[] = {
         {"build_info", "Version of this program.", "version=\"" PAL_VERSION "\"", 1},
         {"sessions", "Sessions of this process.", NULL, hub->n_room},
+        {"recordings_failed", "Sessions whose recording has ended by a failed write.", NULL, n_record_error},
         {"clients", "Members by role.", "role=\"viewer\",transport=\"ws\"", role[PAL_MEMBER_VIEWER]},
         {.label = "role=\"trainee\",transport=\"ws\"", .value = role[PAL_MEMBER_TRAINEE]},
         {.label = "role=\"instructor\",transport=\"ws\"", .value = role[PAL_MEMBER_INSTRUCTOR]},

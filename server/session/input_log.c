@@ -4,17 +4,22 @@
 
 #include "server/base/clock.h"
 #include "server/base/hash.h"
+#include "server/base/log.h"
 #include "server/base/thread.h"
 #include "server/session/tuning.h"
 
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
+#include <zlib.h>
 
-enum { VERSION = 4, OLDEST = 1, RING_DEFAULT = 4 << 20 };
+enum { VERSION = 5, RING_DEFAULT = 4 << 20, MAX_NUMBER = 9999 };
 static const char magic[8] = {'p', 'a', 'l', 'i', 'n', 'l', 'o', 'g'};
 
 struct pal_input_log {
@@ -23,8 +28,11 @@ struct pal_input_log {
     uint8_t *ring;
     size_t n_ring;                /* a power of two                              */
     _Atomic uint64_t filled, out; /* bytes put in, bytes written; both only increase */
-    _Atomic bool stop, failed;
+    _Atomic bool stop;
+    _Atomic int error; /* errno of the first failure; 0: none */
     uint64_t n_dropped;
+    bool unsaved; /* written since the last fdatasync */
+    char path[PATH_MAX];
 };
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "logs are written in the host's order");
@@ -32,7 +40,7 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "logs are written in t
 typedef struct record_head {
     uint8_t kind, index;
     uint16_t n_byte;
-    uint32_t zero;
+    uint32_t crc;
     uint64_t step;
 } record_head;
 _Static_assert(sizeof(pal_input_header) == PAL_INPUT_HEADER && sizeof(record_head) == PAL_INPUT_HEAD,
@@ -196,6 +204,16 @@ uint64_t pal_scene_fingerprint(const pal_scene *scene)
     return h;
 }
 
+/* of head and payload with 0 for the CRC */
+uint32_t pal_input_crc(const uint8_t *record, size_t n)
+{
+    static const uint8_t none[sizeof(uint32_t)];
+    const size_t at = offsetof(record_head, crc), after = at + sizeof none;
+    uLong crc = crc32_z(0, record, at);
+    crc = crc32_z(crc, none, sizeof none);
+    return (uint32_t)crc32_z(crc, record + after, n - after);
+}
+
 static bool write_all(int file, const uint8_t *bytes, size_t n)
 {
     while (n > 0) {
@@ -207,6 +225,21 @@ static bool write_all(int file, const uint8_t *bytes, size_t n)
     return true;
 }
 
+static void fail(pal_input_log *log)
+{
+    const int error = errno ? errno : EIO;
+    atomic_store(&log->error, error);
+    pal_log(PAL_LOG_ERROR, "record", "%s: the recording ends here: %s", log->path, strerror(error));
+}
+
+/* what is not on a disk (a pipe, a device) has nothing to save */
+static void save(pal_input_log *log)
+{
+    if (!log->unsaved || pal_input_log_error(log)) return;
+    if (fdatasync(log->file) && errno != EINVAL && errno != EROFS) fail(log);
+    log->unsaved = false;
+}
+
 /* writes the content of the ring buffer, in at most two pieces */
 static void drain(pal_input_log *log)
 {
@@ -215,7 +248,10 @@ static void drain(pal_input_log *log)
     while (out < filled) {
         size_t begin = (size_t)out & (log->n_ring - 1), n = (size_t)(filled - out);
         if (n > log->n_ring - begin) n = log->n_ring - begin;
-        if (!atomic_load(&log->failed) && !write_all(log->file, log->ring + begin, n)) atomic_store(&log->failed, true);
+        if (!pal_input_log_error(log)) {
+            log->unsaved = true;
+            if (!write_all(log->file, log->ring + begin, n)) fail(log);
+        }
         out += n;
         atomic_store_explicit(&log->out, out, memory_order_release);
     }
@@ -224,14 +260,38 @@ static void drain(pal_input_log *log)
 static void *writer(void *user)
 {
     pal_input_log *log = user;
-    uint64_t when = pal_clock_ns();
+    uint64_t when = pal_clock_ns(), save_ns = when;
     while (!atomic_load(&log->stop)) {
         drain(log);
+        if (when >= save_ns) {
+            save(log);
+            save_ns = when + PAL_LOG_SAVE_NS;
+        }
         when += PAL_LOG_FLUSH_NS;
         pal_clock_sleep_until_ns(when);
     }
     drain(log);
+    save(log);
     return NULL;
+}
+
+/* a new file of this name, or with the next number before its suffix; its descriptor, < 0: errno */
+static int create(const char *path, char name[PATH_MAX])
+{
+    const char *slash = strrchr(path, '/'), *dot = strrchr(slash ? slash : path, '.');
+    const int n_stem = (int)(dot && dot > (slash ? slash + 1 : path) ? (size_t)(dot - path) : strlen(path));
+    struct stat there;
+    errno = ENAMETOOLONG;
+    if (strlen(path) > PATH_MAX - 8) return -1;
+    for (int k = 1; k <= MAX_NUMBER; k++) {
+        (void)snprintf(name, PATH_MAX, "%s", path);
+        if (k > 1) (void)snprintf(name, PATH_MAX, "%.*s.%d%s", n_stem, path, k, path + n_stem);
+        const int file = open(name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+        if (file >= 0 || errno != EEXIST) return file;
+        /* a device is no recording */
+        if (k == 1 && !stat(name, &there) && S_ISCHR(there.st_mode)) return open(name, O_WRONLY | O_CLOEXEC);
+    }
+    return -1;
 }
 
 static bool write_header(pal_input_log *log, const pal_scene *scene)
@@ -258,7 +318,7 @@ pal_err pal_input_log_open(const char *path, const pal_scene *scene, size_t ring
         return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the input log");
     }
     log->n_ring = n_ring;
-    log->file = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    log->file = create(path, log->path);
     bool good = log->file >= 0 && write_header(log, scene) && !(errno = pal_thread_start(&log->thread, writer, log));
     if (!good) {
         int reason = errno;
@@ -284,6 +344,8 @@ static size_t encode(const pal_input_record *record, uint8_t bytes[PAL_INPUT_HEA
         memcpy(bytes + at, (const uint8_t *)record + f->offset, f->n_byte);
         at += f->n_byte;
     }
+    head.crc = pal_input_crc(bytes, at);
+    memcpy(bytes, &head, sizeof head);
     return at;
 }
 
@@ -307,6 +369,16 @@ uint64_t pal_input_log_dropped(const pal_input_log *log)
     return log ? log->n_dropped : 0;
 }
 
+const char *pal_input_log_path(const pal_input_log *log)
+{
+    return log->path;
+}
+
+int pal_input_log_error(const pal_input_log *log)
+{
+    return log ? atomic_load_explicit(&log->error, memory_order_relaxed) : 0;
+}
+
 pal_err pal_input_log_close(pal_input_log *log, uint64_t step, uint64_t hash)
 {
     uint8_t bytes[PAL_INPUT_HEAD + PAL_INPUT_PAYLOAD];
@@ -314,8 +386,13 @@ pal_err pal_input_log_close(pal_input_log *log, uint64_t step, uint64_t hash)
     atomic_store(&log->stop, true);
     pthread_join(log->thread, NULL);
     pal_input_record end = {.kind = PAL_INPUT_END, .step = step, .hash = hash, .n_dropped = log->n_dropped};
-    bool good = !atomic_load(&log->failed) && write_all(log->file, bytes, encode(&end, bytes));
-    good = close(log->file) == 0 && good;
+    if (!pal_input_log_error(log)) {
+        log->unsaved = true;
+        if (!write_all(log->file, bytes, encode(&end, bytes))) fail(log);
+        save(log);
+    }
+    if (close(log->file) && !pal_input_log_error(log)) fail(log);
+    const bool good = !pal_input_log_error(log);
     free(log->ring);
     free(log);
     return good ? PAL_ERR_OK : PAL_ERR_IO;
@@ -329,9 +406,8 @@ pal_err pal_input_get_header(const char *name, const uint8_t *bytes, size_t n_by
         return PAL_REFUSE(diag, "%s: byte 0: not an input log", name);
     if (n_byte < PAL_INPUT_HEADER) return PAL_REFUSE(diag, "%s: byte %zu: the log is cut in its header", name, n_byte);
     memcpy(&header, bytes, sizeof header);
-    if (header.version < OLDEST || header.version > VERSION)
-        return PAL_REFUSE(diag, "%s: byte 8: log version %u, this program reads %d to %d", name, header.version, OLDEST,
-                          VERSION);
+    if (header.version != VERSION)
+        return PAL_REFUSE(diag, "%s: byte 8: log version %u, this program reads %d", name, header.version, VERSION);
     if (header.hash_steps < 1 || header.hash_steps > PAL_INPUT_HASH_MAX)
         return PAL_REFUSE(diag, "%s: byte 12: %u steps between hashes are outside 1 .. %d", name, header.hash_steps,
                           PAL_INPUT_HASH_MAX);
@@ -348,10 +424,12 @@ pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_by
     record_head head;
     memcpy(&head, bytes + *at, sizeof head);
     pal_input_record record = {.kind = (pal_input_kind)head.kind, .index = head.index, .step = head.step};
-    if (payload_of(record.kind) != head.n_byte || head.zero)
+    if (payload_of(record.kind) != head.n_byte)
         return PAL_REFUSE(diag, "%s: byte %zu: no record of kind %d has %d bytes", name, *at, head.kind, head.n_byte);
     if (n_byte - *at - PAL_INPUT_HEAD < head.n_byte)
         return PAL_REFUSE(diag, "%s: byte %zu: the log is cut in a record", name, *at);
+    if (pal_input_crc(bytes + *at, PAL_INPUT_HEAD + (size_t)head.n_byte) != head.crc)
+        return PAL_REFUSE(diag, "%s: byte %zu: a record is damaged: its CRC is another", name, *at);
     const uint8_t *from = bytes + *at + sizeof head;
     for (const struct field *f = fields; f < fields + N_FIELD; f++) {
         if (f->kind != record.kind) continue;

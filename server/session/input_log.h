@@ -1,24 +1,25 @@
 /* Byte format of the input log, its writer and its reader, and what a record does. Private to server/session; replay.h
  * is the public interface.
  *
- * Little-endian. Header, 40 bytes: "palinlog", u32 version 4 (1 lacks BRUSH, 2 lacks RESET_BODY, 3 lacks COMPONENT),
- * u32 hash interval in steps, f64 step_s, u64 scene fingerprint, u32 bodies, u32 tools. Records follow: u8 kind, u8
- * index (tool or body), u16 payload bytes, u32 zero, u64 steps taken since open, payload. A record takes effect before
- * the next step. The last record is END; a file without it is truncated.
+ * Little-endian. Header, 40 bytes: "palinlog", u32 version 5, u32 hash interval in steps, f64 step_s, u64 scene
+ * fingerprint, u32 bodies, u32 tools. Records follow: u8 kind, u8 index (tool or body), u16 payload bytes, u32 CRC-32
+ * of the record (zlib's, with 0 in this place), u64 steps taken since open, payload. A record takes effect before the
+ * next step. The last record is END; a file without it was cut, and is good up to its last whole record.
  *
  *   POSE      tool   88  f64 position[3], quat[4], velocity[3], u32 buttons, u32 seq
  *   RELEASE   tool    0
  *   RESET     0       0
- *   RESET_BODY body   0                                  (version 3)
+ *   RESET_BODY body   0
  *   MATERIAL  body   32  f64 young_Pa, poisson, density_kg_m3, damping_1_s
  *   BRUSH     body  112  u32 tool, u32 kind, f64 at_m[3], to_m[3], radius_m, softness, pressure_Pa, lift_m[3],
- *                        stiffness_N_m (version 2)
- *   COMPONENT body   52  u32 on, name[48], zero-padded (version 4)
+ *                        stiffness_N_m
+ *   COMPONENT body   52  u32 on, name[48], zero-padded
  *   HASH      0       8  u64 world hash, at least every `hash interval` steps
  *   END       0      16  u64 world hash, u64 dropped records (0: the log is complete)
  *
  * The put functions copy into a ring buffer; they never wait, allocate or touch the file. A separate thread writes the
- * file. A record that does not fit is dropped and counted, and END reports it. */
+ * file, and sees to it once a second that it is on the disk (fdatasync). A record that does not fit is dropped and
+ * counted, and END reports it. A file that is there is never written over: "run.log" becomes "run.2.log". */
 #ifndef PAL_SESSION_INPUT_LOG_H
 #define PAL_SESSION_INPUT_LOG_H
 #include "server/sim/world/world.h"
@@ -64,11 +65,14 @@ pal_err pal_input_apply(pal_world *world, const pal_scene *scene, const pal_inpu
 uint64_t pal_scene_fingerprint(const pal_scene *scene);
 
 typedef struct pal_input_log pal_input_log;
-/* creates the file and starts the writer thread; ring_byte 0: 4 MiB. IO, MEMORY. [load] */
+/* creates a new file and starts the writer thread; ring_byte 0: 4 MiB. IO, MEMORY. [load] */
 pal_err pal_input_log_open(const char *path, const pal_scene *scene, size_t ring_byte, pal_diagnostic *diag,
                            pal_input_log **out);
 void pal_input_log_put(pal_input_log *log, const pal_input_record *record); /* [sim] NULL log is fine */
 uint64_t pal_input_log_dropped(const pal_input_log *log);                   /* [sim] */
+const char *pal_input_log_path(const pal_input_log *log);                   /* of the file */
+/* errno of the first write that failed, after which nothing is written; 0: none. NULL: 0. [any] */
+int pal_input_log_error(const pal_input_log *log);
 /* writes END with the last hash of the world, joins the writer and closes the file; IO: any write failed. [load] */
 pal_err pal_input_log_close(pal_input_log *log, uint64_t step, uint64_t hash);
 
@@ -79,6 +83,8 @@ typedef struct pal_input_header {
     uint64_t fingerprint;
     uint32_t n_body, n_tool;
 } pal_input_header;
+/* the CRC of a whole record of n bytes, whatever stands in its place */
+uint32_t pal_input_crc(const uint8_t *record, size_t n);
 /* bounds-checked; advance *at; REFUSED gives the byte offset */
 pal_err pal_input_get_header(const char *name, const uint8_t *bytes, size_t n_byte, pal_input_header *out, size_t *at,
                              pal_diagnostic *diag);

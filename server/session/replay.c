@@ -5,19 +5,25 @@
 #include "server/mesh/files/file_bytes.h"
 #include "server/session/input_log.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 
-/* is the log complete, ordered, and within the scene's tools and bodies? */
-static pal_err check(const char *name, const uint8_t *bytes, size_t n_byte, pal_input_header *header,
-                     pal_diagnostic *diag)
+/* is the log ordered, and within the scene's tools and bodies? *n_good: bytes up to its end or its first bad record,
+ * of which cut [n_cut] tells */
+static pal_err check(const char *name, const uint8_t *bytes, size_t n_byte, pal_input_header *header, size_t *n_good,
+                     char *cut, size_t n_cut, pal_diagnostic *diag)
 {
     size_t at = 0;
     uint64_t step = 0, hash_step = 0;
     PAL_TRY(pal_input_get_header(name, bytes, n_byte, header, &at, diag));
     for (;;) {
         pal_input_record record;
-        size_t begin = at;
-        PAL_TRY(pal_input_get_record(name, bytes, n_byte, &at, &record, diag));
+        pal_diagnostic bad = {""};
+        const size_t begin = *n_good = at;
+        if (pal_input_get_record(name, bytes, n_byte, &at, &record, &bad)) {
+            snprintf(cut, n_cut, "%s", bad.text);
+            return PAL_ERR_OK;
+        }
         /* END first: a log with dropped records may have gaps, and the drop is the better diagnostic */
         if (record.kind == PAL_INPUT_END && record.n_dropped)
             return PAL_REFUSE(diag, "%s: %llu records were lost while the log was written", name,
@@ -37,6 +43,7 @@ static pal_err check(const char *name, const uint8_t *bytes, size_t n_byte, pal_
         if (record.kind != PAL_INPUT_END) continue;
         if (at != n_byte)
             return PAL_REFUSE(diag, "%s: byte %zu: %zu bytes after the end record", name, at, n_byte - at);
+        *n_good = at;
         return PAL_ERR_OK;
     }
 }
@@ -68,10 +75,10 @@ static pal_err run(const char *name, const uint8_t *bytes, size_t n_byte, const 
                    const pal_replay_watch *watch, pal_replay_report *report, pal_diagnostic *diag)
 {
     pal_input_header header;
-    pal_input_record record = {.kind = PAL_INPUT_RESET};
+    pal_input_record record;
     size_t at = 0;
     PAL_TRY(pal_input_get_header(name, bytes, n_byte, &header, &at, diag));
-    while (record.kind != PAL_INPUT_END) {
+    while (at < n_byte) {
         PAL_TRY(pal_input_get_record(name, bytes, n_byte, &at, &record, diag));
         for (; report->n_tick < record.step; report->n_tick++) {
             pal_err err = pal_world_step(world, scene->step_s);
@@ -93,7 +100,7 @@ pal_err pal_replay_parse(const char *name, const uint8_t *bytes, size_t n_byte, 
 {
     pal_input_header header;
     pal_replay_report report = {.first_difference = UINT64_MAX};
-    PAL_TRY(check(name, bytes, n_byte, &header, diag));
+    PAL_TRY(check(name, bytes, n_byte, &header, &n_byte, report.cut, sizeof report.cut, diag));
     if (scene) {
         if (header.fingerprint != pal_scene_fingerprint(scene) || (int)header.n_tool != scene->n_tool ||
             (int)header.n_body != scene->n_body)

@@ -57,7 +57,7 @@ typedef struct pal_session_options {
     bool unpaced;             /* steps as fast as possible (tests, replay); the newest frame still wins */
     void (*wake)(void *user); /* [sim] called after a frame is published; must not block; NULL: none */
     void *user;
-    const char *record_path; /* path of the input log to write (replay.h); NULL: none */
+    const char *record_path; /* path of the new input log (replay.h, input_log.h); NULL: none */
     const pal_clock *clock;  /* of pacing, leases, arrival times and estimates; NULL: pal_clock_monotonic */
 } pal_session_options;
 
@@ -95,6 +95,8 @@ void pal_session_rehearse(pal_session *next, pal_session *before, pal_session_sn
 double pal_session_pause_s(const pal_session *session, int *n_rehearsed);
 void pal_session_close(pal_session *session); /* stops and joins the thread; NULL is fine. [load] */
 
+/* errno of the first write of its record that failed, after which it records nothing; 0: none. [any] */
+int pal_session_record_error(const pal_session *session);
 const pal_scene *pal_session_scene(const pal_session *session); /* [any] */
 const pal_clock *pal_session_clock(const pal_session *session); /* [any] */
 /* The plan at open and the displayed parts; constant while the session lives. Frames name the current components,

@@ -315,7 +315,9 @@ static pal_err prepare(pal_session *s, pal_diagnostic *diag)
     for (int t = 0; t < PAL_TOOL_MAX; t++)
         pal_triple_buffer_init(&s->tool[t].triple_buffer, &s->tool[t].slot[0], &s->tool[t].slot[1],
                                &s->tool[t].slot[2]);
-    if (s->options.record_path) return pal_input_log_open(s->options.record_path, s->scene, 0, diag, &s->log);
+    if (!s->options.record_path) return PAL_ERR_OK;
+    PAL_TRY(pal_input_log_open(s->options.record_path, s->scene, 0, diag, &s->log));
+    pal_log(PAL_LOG_INFO, "record", "%s: records %s", pal_input_log_path(s->log), s->scene->name);
     return PAL_ERR_OK;
 }
 
@@ -388,12 +390,10 @@ void pal_session_close(pal_session *s)
     if (!s) return;
     pal_session_stop(s);
     if (s->log) {
-        uint64_t n_dropped = pal_input_log_dropped(s->log);
-        if (pal_input_log_close(s->log, s->step, pal_world_hash(s->world)))
-            pal_log(PAL_LOG_ERROR, "record", "%s: the input log could not be written", s->options.record_path);
-        else if (n_dropped)
+        if (pal_input_log_dropped(s->log))
             pal_log(PAL_LOG_WARN, "record", "%s: %llu records did not fit and are missing: the log cannot be replayed",
-                    s->options.record_path, (unsigned long long)n_dropped);
+                    pal_input_log_path(s->log), (unsigned long long)pal_input_log_dropped(s->log));
+        (void)pal_input_log_close(s->log, s->step, pal_world_hash(s->world)); /* it tells what fails */
     }
     release(s);
 }
@@ -403,6 +403,11 @@ void pal_session_close(pal_session *s)
 const pal_scene *pal_session_scene(const pal_session *s)
 {
     return s->scene;
+}
+
+int pal_session_record_error(const pal_session *s)
+{
+    return pal_input_log_error(s->log);
 }
 
 const pal_clock *pal_session_clock(const pal_session *s)

@@ -121,7 +121,7 @@ pal_err pal_session_transfer_end(pal_session *next, pal_session *before, pal_dia
     measure_pause(next, next->stopped_ns);
     if (!err && before->log)
         pal_log(PAL_LOG_WARN, "record", "%s: ends at step %llu: another session continues with a changed scene",
-                before->options.record_path, (unsigned long long)before->step);
+                pal_input_log_path(before->log), (unsigned long long)before->step);
     if (!err) return PAL_ERR_OK;
     atomic_store_explicit(&before->stop, false, memory_order_release);
     atomic_store_explicit(&before->replaced, false, memory_order_relaxed);

@@ -10,6 +10,8 @@
 #define PAL_LATE_PART 0.1
 /* ns between two writes of the input log, and the longest wait of its closing (test_replay) */
 #define PAL_LOG_FLUSH_NS 20000000u
+/* ns between two fdatasync of the input log: what kill -9 or a power cut may cost (test_replay) */
+#define PAL_LOG_SAVE_NS 1000000000u
 /* fraction of a body's size: drift since the last snapshot above which a switch is rehearsed again
  * (test_configuration_switch) */
 #define PAL_CONFIGURATION_SWITCH_MAX_DRIFT 0.005

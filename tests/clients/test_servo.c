@@ -368,31 +368,31 @@ static void continuous_rating_scales_a_long_push_down(void)
 }
 
 /* a device that gives half of what is written, and may tell it */
-static bool half_tells;
+static bool half_reports;
 static double half_N[3];
 static int half_read(void *handle, pal_dev_state *state)
 {
     const int error = pal_device_virtual()->read(handle, state);
-    state->has_force = half_tells;
+    state->has_force = half_reports;
     pal_copy3(state->force_N, half_N);
     return error;
 }
-static int half_write(void *handle, const double force_N[3], const double torque_N_m[3], double grip)
+static int half_write(void *handle, const double force_N[3], const double torque_N_m[3], double grasp)
 {
     pal_scale3(half_N, 0.5, force_N);
-    return pal_device_virtual()->write(handle, half_N, torque_N_m, grip);
+    return pal_device_virtual()->write(handle, half_N, torque_N_m, grasp);
 }
 
 /* what the tank has gained, mJ, when a hand has pushed such a device slowly into 200 N/m, and the energy stored there
  */
-static double gain_of_a_press(bool tells, double *stored_mJ)
+static double gain_of_a_press(bool reports, double *stored_mJ)
 {
     trial r;
     pal_haptic_v1 half = *pal_device_virtual();
     pal_servo_options options = level;
     half.read = half_read, half.write = half_write;
     options.backend = &half;
-    half_tells = tells;
+    half_reports = reports;
     pal_set3(half_N, 0, 0, 0);
     *stored_mJ = NAN;
     if (!rig_open_as(&r, "premium,script=still,clock=virtual", 200, &options)) return NAN;
@@ -412,10 +412,10 @@ static double gain_of_a_press(bool tells, double *stored_mJ)
 static void work_is_that_of_the_force_that_the_device_tells(void)
 {
     double stored_mJ;
-    const double silent_mJ = gain_of_a_press(false, &stored_mJ), told_mJ = gain_of_a_press(true, &stored_mJ);
+    const double silent_mJ = gain_of_a_press(false, &stored_mJ), reported_mJ = gain_of_a_press(true, &stored_mJ);
     printf("  %g mJ stored: the tank gains %g mJ, %g mJ when told of half of the force\n", stored_mJ, silent_mJ,
-           told_mJ);
-    CHECK_NEAR(silent_mJ - told_mJ, 0.5 * stored_mJ, 0.1 * stored_mJ);
+           reported_mJ);
+    CHECK_NEAR(silent_mJ - reported_mJ, 0.5 * stored_mJ, 0.1 * stored_mJ);
 }
 
 static void stiffness_above_the_device_is_rendered_at_its_clamp(void)

@@ -224,6 +224,34 @@ run replay rec.bin organ
 refused 1 "recorded from another scene"
 end
 
+begin "a recording survives kill -9, is not written over, and a closed terminal ends it in order"
+"$palpate" serve scene --port 0 --record rec.bin >serve.out 2>serve.err &
+server=$!
+check "serve did not start" shows serve.out "$server" "http://"
+check "the file that is there was taken" has serve.err "rec.2.bin: records"
+check "nothing is recorded" grows rec.2.bin "$server" 1000
+kill -KILL "$server"
+wait "$server" 2>/dev/null
+run replay rec.2.bin scene --json
+check "replay: exit code $code" code_is 0
+check "the cut is not told" has out '"cut":"rec.2.bin: byte [0-9]*: the log is cut'
+check "a hash differs" has out '"first_difference":null'
+run replay rec.2.bin scene --strict
+refused 1 "the log is cut"
+run replay rec.bin scene --strict --quiet
+check "replay of the first: exit code $code" code_is 0
+"$palpate" serve scene --port 0 --record rec.bin >serve.out 2>serve.err &
+server=$!
+check "serve did not start" shows serve.out "$server" "http://"
+check "nothing is recorded" grows rec.3.bin "$server" 100
+kill -HUP "$server"
+wait "$server"
+code=$?
+check "serve after SIGHUP: exit code $code" code_is 0
+run replay rec.3.bin scene --strict --quiet
+check "replay after SIGHUP: exit code $code" code_is 0
+end
+
 # ---- finite elements ----
 begin "solve answers the shipped beam within its reference's error, with every figure"
 run solve "$problems/beam.json" --case tip --json

@@ -1,12 +1,17 @@
-/* Input logs: what a live session recorded gives the same hashes again; a log that is broken, cut, foreign or not whole
- * is refused with one sentence. */
+/* Input logs: what a live session recorded gives the same hashes again, of a log that was cut or damaged up to the last
+ * whole record; one that is foreign or lost records is refused with one sentence. A file is never written over. */
 #include "server/session/input_log.h"
 #include "server/session/replay.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 #include "tests/session/session_scene.h"
 #include "tests/session/stepped_session.h"
 
+#include <errno.h>
+#include <sched.h>
+#include <signal.h>
 #include <stddef.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 
 static pal_scene scene;
@@ -84,6 +89,13 @@ static void a_recorded_session_gives_the_same_hashes_again(void)
     CHECK(report.last_hash != 0);
 }
 
+/* gives a record of n bytes the CRC that it should have */
+static void seal(uint8_t *record_, size_t n)
+{
+    const uint32_t crc = pal_input_crc(record_, n);
+    memcpy(record_ + 4, &crc, sizeof crc);
+}
+
 /* changes one byte of the payload of every record of a kind; the step of the first one, 0: there is none */
 static uint64_t change(uint8_t *bytes, pal_input_kind kind, size_t byte)
 {
@@ -95,6 +107,7 @@ static uint64_t change(uint8_t *bytes, pal_input_kind kind, size_t byte)
     for (size_t place = at; !pal_input_get_record("log", bytes, n_whole, &at, &record_, NULL); place = at) {
         if (record_.kind != kind) continue;
         bytes[place + PAL_INPUT_HEAD + byte] ^= 4;
+        seal(bytes + place, at - place);
         if (!first) first = record_.step;
     }
     return first;
@@ -121,16 +134,45 @@ static void changed_poses_and_materials_are_found_at_the_next_hash(void)
     }
 }
 
-static void every_cut_is_refused_with_its_byte(void)
+static void every_cut_is_told_with_its_byte_and_the_rest_is_replayed(void)
 {
     pal_replay_report report;
     pal_diagnostic diag;
+    uint64_t last = 0;
     REQUIRE(n_whole > 0);
     CHECK_INT(pal_replay_parse("log", whole, n_whole, NULL, NULL, &report, &diag), 0);
+    CHECK_TEXT(report.cut, "");
     for (size_t n = 0; n < n_whole; n += n < 300 ? 1 : 977) {
         diag.text[0] = 0;
-        CHECK_INT(pal_replay_parse("log", whole, n, NULL, NULL, &report, &diag), PAL_ERR_REFUSED);
-        CHECK(!strncmp(diag.text, "log: byte ", 10));
+        const pal_err err = pal_replay_parse("log", whole, n, NULL, NULL, &report, &diag);
+        CHECK_INT(err, n < PAL_INPUT_HEADER ? PAL_ERR_REFUSED : PAL_ERR_OK);
+        CHECK(!strncmp(err ? diag.text : report.cut, "log: byte ", 10));
+    }
+    for (size_t n = PAL_INPUT_HEADER; n < n_whole; n += n_whole / 7) {
+        REQUIRE(!pal_replay_parse("log", whole, n, &scene, NULL, &report, &diag));
+        CHECK_INT(report.n_hash_equal, report.n_hash);
+        CHECK(report.n_tick >= last && report.n_tick <= STEPS);
+        last = report.n_tick;
+    }
+    CHECK(last >= STEPS / 2);
+}
+
+/* any changed bit of a record is found, and what was before it is replayed */
+static void a_damaged_record_ends_the_log(void)
+{
+    static uint8_t bytes[sizeof whole];
+    uint64_t seed = 3;
+    REQUIRE(n_whole > 0);
+    for (int k = 0; k < 400; k++) {
+        pal_replay_report report;
+        pal_diagnostic diag = {""};
+        unsigned long long at = 0;
+        const size_t place = PAL_INPUT_HEADER + (size_t)random_below(&seed, n_whole - PAL_INPUT_HEADER);
+        memcpy(bytes, whole, n_whole);
+        bytes[place] ^= (uint8_t)(1u << random_below(&seed, 8));
+        REQUIRE(!pal_replay_parse("log", bytes, n_whole, NULL, NULL, &report, &diag));
+        CHECK_INT(sscanf(report.cut, "log: byte %llu", &at), 1);
+        CHECK(at <= place && place < at + PAL_INPUT_HEAD + PAL_INPUT_PAYLOAD);
     }
 }
 
@@ -150,21 +192,23 @@ static void broken_logs_are_refused_with_one_sentence(void)
         size_t place;
         uint8_t value;
         const char *part;
-    } fault[] = {{0, 'x', "not an input log"},
-                 {8, 5, "version 5"},
-                 {13, 0xff, "steps between hashes"},
-                 {24, (uint8_t)(whole[24] ^ 1), "another scene"},
-                 {PAL_INPUT_HEADER, 77, "no record of kind 77"},
-                 {PAL_INPUT_HEADER + 4, 1, "no record of kind"},
-                 {PAL_INPUT_HEADER + 1, 5, "no tool 5"},
-                 {PAL_INPUT_HEADER + 12, 9, "does not follow"}};
+    } fault[] = {{0, 'x', "not an input log"},           {8, 4, "version 4"},
+                 {13, 0xff, "steps between hashes"},     {24, (uint8_t)(whole[24] ^ 1), "another scene"},
+                 {PAL_INPUT_HEADER + 1, 5, "no tool 5"}, {PAL_INPUT_HEADER + 12, 9, "does not follow"}};
+    size_t first_end = 0;
+    pal_input_header header;
+    pal_input_record first;
+    REQUIRE(!pal_input_get_header("log", whole, n_whole, &header, &first_end, NULL));
+    REQUIRE(!pal_input_get_record("log", whole, n_whole, &first_end, &first, NULL));
     for (size_t k = 0; k < sizeof fault / sizeof fault[0]; k++) {
         memcpy(bytes, whole, n_whole);
         bytes[fault[k].place] = fault[k].value;
+        seal(bytes + PAL_INPUT_HEADER, first_end - PAL_INPUT_HEADER);
         refused(bytes, n_whole, fault[k].part);
     }
     memcpy(bytes, whole, n_whole);
     bytes[n_whole - 1] = 1;
+    seal(bytes + n_whole - PAL_INPUT_HEAD - 16, PAL_INPUT_HEAD + 16);
     refused(bytes, n_whole, "records were lost");
     memcpy(bytes, whole, n_whole);
     refused(bytes, n_whole + 1, "1 bytes after the end");
@@ -195,6 +239,7 @@ static void what_does_not_fit_is_counted_and_makes_the_log_invalid(void)
     int file = mkstemp(name);
     REQUIRE(file >= 0);
     close(file);
+    unlink(name);
     REQUIRE(!pal_input_log_open(name, &scene, 1024, &diag, &log));
     for (int k = 0; k < 20000; k++)
         pal_input_log_put(log, &(pal_input_record){.kind = PAL_INPUT_POSE, .pose = {.quat = {1, 0, 0, 0}}});
@@ -216,11 +261,64 @@ static void a_full_disk_is_told_at_close(void)
     CHECK(strstr(diag.text, "/dev/full") != NULL);
 }
 
+static void a_file_is_never_written_over(void)
+{
+    static const char *const names[] = {"run.log", "run.2.log", "run.3.log"};
+    char folder[] = "/tmp/palpate_record_XXXXXX", first[64], name[64], kept[8] = {0};
+    pal_diagnostic diag = {""};
+    REQUIRE(mkdtemp(folder) != NULL);
+    snprintf(first, sizeof first, "%s/%s", folder, names[0]);
+    FILE *old = fopen(first, "w");
+    REQUIRE(old != NULL);
+    fputs("old", old), fclose(old);
+    for (int k = 1; k < 3; k++) {
+        pal_input_log *log = NULL;
+        REQUIRE(!pal_input_log_open(first, &scene, 0, &diag, &log));
+        snprintf(name, sizeof name, "%s/%s", folder, names[k]);
+        CHECK_TEXT(pal_input_log_path(log), name);
+        CHECK_INT(pal_input_log_close(log, 0, 0), 0);
+    }
+    CHECK_INT(slurp(first, (uint8_t *)kept, sizeof kept), 3);
+    CHECK_TEXT(kept, "old");
+    for (int k = 0; k < 3; k++) snprintf(name, sizeof name, "%s/%s", folder, names[k]), unlink(name);
+    rmdir(folder);
+}
+
+/* a limit of the file's size, as a disk that fills up: the error is known before the end, and what was written is good
+ */
+static void a_disk_that_fills_up_is_told_while_it_records(void)
+{
+    struct rlimit before, small;
+    REQUIRE(!getrlimit(RLIMIT_FSIZE, &before));
+    small = before, small.rlim_cur = 4000;
+    signal(SIGXFSZ, SIG_IGN);
+    unlink(path);
+    REQUIRE(!setrlimit(RLIMIT_FSIZE, &small));
+    pal_session *s = stepped_open(&scene, (pal_session_options){.record_path = path, .lease_s = 0.1});
+    for (int step = 1; s && step <= STEPS; step++) {
+        const pal_pose pose = {.position_m = {0, 0, 0.055}, .quat = {1, 0, 0, 0}, .seq = (uint32_t)step};
+        CHECK(!pal_session_request_pose(s, 0, &pose));
+        stepped_steps(s, 1);
+    }
+    /* the writer comes round every PAL_LOG_FLUSH_NS of real time */
+    while (s && !pal_session_record_error(s)) sched_yield();
+    CHECK_INT(s ? pal_session_record_error(s) : 0, EFBIG);
+    pal_session_close(s);
+    setrlimit(RLIMIT_FSIZE, &before);
+    pal_replay_report report;
+    pal_diagnostic diag = {""};
+    REQUIRE(!pal_replay_run(path, &scene, NULL, &report, &diag));
+    CHECK(report.n_tick > 10 && report.n_pose > 10);
+    CHECK(strstr(report.cut, "the log is cut") != NULL);
+    unlink(path);
+}
+
 static void records_survive_the_round_trip_bit_by_bit(void)
 {
     pal_input_log *log = NULL;
     pal_diagnostic diag = {""};
     static uint8_t bytes[4096];
+    unlink(path);
     REQUIRE(!pal_input_log_open(path, &scene, 0, &diag, &log));
     const pal_input_record in[] = {
         {.kind = PAL_INPUT_POSE,
@@ -267,11 +365,15 @@ int main(void)
     int file = mkstemp(path);
     if (file < 0 || !small_scene(&scene, &mesh, CHECK_REPEATS(6, 4))) return 1;
     close(file);
+    unlink(path);
     /* bodies with a skin have no brushes */
     pal_entry_init(&scene.body[0].output, "output", "surface_output");
     RUN(a_recorded_session_gives_the_same_hashes_again);
     RUN_SERIAL(changed_poses_and_materials_are_found_at_the_next_hash);
-    RUN(every_cut_is_refused_with_its_byte);
+    RUN(every_cut_is_told_with_its_byte_and_the_rest_is_replayed);
+    RUN(a_damaged_record_ends_the_log);
+    RUN(a_file_is_never_written_over);
+    RUN(a_disk_that_fills_up_is_told_while_it_records);
     RUN(broken_logs_are_refused_with_one_sentence);
     RUN_SERIAL(a_log_of_another_material_is_refused_and_texts_do_not_matter);
     RUN(what_does_not_fit_is_counted_and_makes_the_log_invalid);
