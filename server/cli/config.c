@@ -20,6 +20,8 @@ const pal_flag pal_config_keys[PAL_CONFIG_KEYS] = {
     {"port", "N", PAL_FLAG_COUNT, NULL, 0, 65535, "port; 0 takes any free one (8090)"},
     {"allow_remote", NULL, PAL_FLAG_SWITCH, NULL, 0, 1,
      "let other machines connect: needed for any address but this machine's own"},
+    {"hosts", "NAME,...", PAL_FLAG_TEXT, NULL, 0, 0,
+     "names by which other machines reach this one (its addresses and its own name)"},
     {"viewer", "FOLDER", PAL_FLAG_TEXT, NULL, 0, 0, "files of the page (those beside the program)"},
     {"error_m", "M", PAL_FLAG_NUMBER, NULL, 0, 0.01,
      "most error of streamed positions, m (1/3000 of the box, at most 0.00005)"},
@@ -30,9 +32,10 @@ const pal_flag pal_config_keys[PAL_CONFIG_KEYS] = {
 };
 /* where a key is stored, in the order of the keys */
 static const size_t place[PAL_CONFIG_KEYS] = {
-    offsetof(pal_config, listen), offsetof(pal_config, port),    offsetof(pal_config, allow_remote),
-    offsetof(pal_config, viewer), offsetof(pal_config, error_m), offsetof(pal_config, max_clients),
-    offsetof(pal_config, lcm),    offsetof(pal_config, log),     offsetof(pal_config, record),
+    offsetof(pal_config, listen),      offsetof(pal_config, port),   offsetof(pal_config, allow_remote),
+    offsetof(pal_config, hosts),       offsetof(pal_config, viewer), offsetof(pal_config, error_m),
+    offsetof(pal_config, max_clients), offsetof(pal_config, lcm),    offsetof(pal_config, log),
+    offsetof(pal_config, record),
 };
 
 void pal_config_default(pal_config *config)

@@ -9,12 +9,13 @@
 #include "server/base/flags.h"
 #include "server/base/log.h"
 
-enum { PAL_CONFIG_TEXT = 256, PAL_CONFIG_KEYS = 9 };
+enum { PAL_CONFIG_TEXT = 256, PAL_CONFIG_KEYS = 10 };
 
 typedef struct pal_config {
     char listen[PAL_CONFIG_TEXT]; /* "127.0.0.1"                                                         */
     int port;                     /* 8090; 0: any free port                                              */
     bool allow_remote;            /* false: only loopback addresses may be listened on                   */
+    char hosts[PAL_CONFIG_TEXT];  /* "a,b": names by which other machines reach it                      */
     char viewer[PAL_CONFIG_TEXT]; /* folder of the page's files; "": the one beside the program          */
     double error_m;               /* bound of streamed positions; 0: 1/3000 of the box, at most 0.05 mm  */
     int max_clients;              /* 200                                                                 */

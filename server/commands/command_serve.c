@@ -158,6 +158,7 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
     pal_server_options options = {.listen = run->config.listen,
                                   .port = run->config.port,
                                   .allow_remote = run->config.allow_remote,
+                                  .hosts = run->config.hosts,
                                   .viewer_folder = viewer_folder(&run->config, folder, sizeof folder),
                                   .error_m = run->config.error_m,
                                   .max_clients = run->config.max_clients,

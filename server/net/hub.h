@@ -8,9 +8,10 @@
 #include "server/net/hub_core.h"
 
 typedef struct pal_server_options {
-    const char *listen;        /* "127.0.0.1"; any other address needs allow_remote                         */
-    int port;                  /* 8090; 0: any free port, see pal_server_port                               */
-    bool allow_remote;         /* also accepts any Host name (for a proxy), not only loopback names */
+    const char *listen; /* "127.0.0.1"; any other address needs allow_remote                         */
+    int port;           /* 8090; 0: any free port, see pal_server_port                               */
+    bool allow_remote;  /* other machines may connect */
+    const char *hosts;  /* names by which they reach it, "a,b", beside its addresses and its own name; NULL: none */
     const char *viewer_folder; /* files served at /; NULL: none                                             */
     const struct pal_transport_ops *transport; /* NULL: websockets */
     /* of the hub */

@@ -61,7 +61,7 @@ static pal_err choose_address(const pal_server_options *options, pal_listen_addr
                           "listening on %s lets other machines in, without password or encryption: add "
                           "--allow-remote if that is meant",
                           listen);
-    *out = (pal_listen_address){listen, options->port, options->allow_remote};
+    *out = (pal_listen_address){listen, options->port, options->allow_remote, options->hosts};
     return PAL_ERR_OK;
 }
 

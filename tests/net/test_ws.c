@@ -31,11 +31,11 @@ static void *net_main(void *user)
 
 static pal_err net_err;
 
-static void begin(void)
+static void begin(pal_server_options net_options)
 {
     pal_diagnostic diag = {""};
     pal_session_options options = {.lease_s = 60, .wake = pal_server_gate_wake, .user = &gate};
-    pal_server_options net_options = {.port = 0, .viewer_folder = folder};
+    net_options.viewer_folder = folder;
     if (pal_session_open(&organ.scene, &options, &diag, &session)) CHECK_FAIL("no session: %s", diag.text);
     if (pal_server_open(&net_options, &session, 1, &diag, &server)) {
         CHECK_FAIL("no server: %s", diag.text);
@@ -359,6 +359,16 @@ static void flood_closes_the_flooder_alone(void)
 enum { CROWD = 150 };
 static int crowd[CROWD];
 
+/* what takes a socket out of the time limits of libwebsockets: an upgrade to HTTP/2, also as a second request, and a
+ * tunnel */
+#define H2C                                                                                                            \
+    "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: Upgrade, HTTP2-Settings\r\nUpgrade: h2c\r\n"                     \
+    "HTTP2-Settings: AAMAAABkAAQCAAAAAAIAAAAA\r\n\r\n"
+static const char *const held_by[] = {H2C, "GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" H2C,
+                                      "CONNECT /metrics HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"};
+enum { HELD = sizeof held_by / sizeof *held_by };
+static int held[HELD];
+
 static void half_open_connections_keep_nobody_out(void)
 {
     for (int i = 0; i < CROWD; i++) {
@@ -366,6 +376,7 @@ static void half_open_connections_keep_nobody_out(void)
         if (i % 3 == 1) raw_send_text(crowd[i], "GET / HTTP/1.1\r\nHost: 127.");
         if (i % 3 == 2) raw_send_text(crowd[i], "\x16\x03\x01\x02\x00\x01garbage\r\n\r\n");
     }
+    for (size_t i = 0; i < HELD; i++) raw_send_text(held[i] = raw_connect(port), held_by[i]);
     CHECK(still_serves());
     int client = joined(WATCH);
     CHECK_INT(raw_until(client, 2)->opcode, 2);
@@ -376,6 +387,10 @@ static void half_open_connections_are_closed_by_the_server(void)
 {
     CHECK(raw_ended(crowd[0]));
     CHECK(raw_ended(crowd[1]));
+    for (size_t i = 0; i < HELD; i++) {
+        if (!raw_ended(held[i])) CHECK_FAIL("still open after \"%.20s\"", held_by[i]);
+        close(held[i]);
+    }
     for (int i = 0; i < CROWD; i++) close(crowd[i]);
 }
 
@@ -402,6 +417,51 @@ static void address_and_port_are_refused_with_a_sentence(void)
     options = (pal_server_options){.viewer_folder = "/no/such/folder"};
     CHECK_INT(pal_server_open(&options, &session, 1, &diag, &second), PAL_ERR_IO);
     CHECK(second == NULL);
+}
+
+/* a name that is not known may be a stranger's page whose name was made to lead here */
+static void other_machines_come_by_address_or_by_a_listed_name(void)
+{
+    char own[256] = "";
+    REQUIRE(!gethostname(own, sizeof own - 1));
+    const struct {
+        const char *host;
+        int status;
+    } kind[] = {{"127.0.0.1", 200},
+                {"localhost:8090", 200},
+                {"192.168.1.5:8090", 200},
+                {"[fe80::1]:8090", 200},
+                {"[::1]", 200},
+                {"organ.example", 200},
+                {"ORGAN.example:443", 200},
+                {"station", 200},
+                {own, 200},
+                {"evil.example", 403},
+                {"evil.example:8090", 403},
+                {"organ.example.evil.example", 403},
+                {"organ.exampl", 403},
+                {"organ.example,station", 403},
+                {"[::1]evil:9401", 403},
+                {"[evil.example]", 403},
+                {"127.0.0.1.evil.example", 403},
+                {"localhost:80x", 403},
+                {"localhost:", 403},
+                {"[::1", 403},
+                {":80", 403}};
+    for (size_t i = 0; i < sizeof kind / sizeof *kind; i++) {
+        char request[512];
+        snprintf(request, sizeof request, "GET /healthz HTTP/1.1\r\nHost: %s\r\n\r\n", kind[i].host);
+        const int status = raw_request(port, request, head, sizeof head, NULL, 0, NULL);
+        check_count++;
+        if (status != kind[i].status) CHECK_FAIL("%s: status %d, wanted %d", kind[i].host, status, kind[i].status);
+    }
+    /* a page of such a name may not open a websocket either */
+    int fd = raw_connect(port);
+    raw_send_text(fd, "GET /ws HTTP/1.1\r\nHost: evil.example\r\nOrigin: http://evil.example\r\n"
+                      "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+                      "Sec-WebSocket-Version: 13\r\n" PALPATE "\r\n");
+    CHECK_INT(raw_head(fd, head, sizeof head), 403);
+    close(fd);
 }
 
 static void goodbye_is_said_to_everybody(void)
@@ -437,7 +497,7 @@ int main(void)
     if (!mkdtemp(folder) || !small_scene_make(&organ, "small")) return 1;
     for (size_t i = 0; i < 4; i++) put(file[i][0], file[i][1]);
     put_large();
-    begin();
+    begin((pal_server_options){0});
     RUN(half_open_connections_keep_nobody_out);
     RUN(upgrade_needs_the_subprotocol_the_path_and_the_own_origin);
     RUN(session_is_named_in_the_address);
@@ -453,6 +513,9 @@ int main(void)
     RUN(address_and_port_are_refused_with_a_sentence);
     RUN(half_open_connections_are_closed_by_the_server);
     RUN(goodbye_is_said_to_everybody);
+    end();
+    begin((pal_server_options){.allow_remote = true, .hosts = "organ.example,station"});
+    RUN(other_machines_come_by_address_or_by_a_listed_name);
     end();
     for (size_t i = 0; i < 5; i++) {
         char path[300];

@@ -46,9 +46,10 @@ typedef struct pal_peer_events {
 
 /* where to listen */
 typedef struct pal_listen_address {
-    const char *ip; /* "127.0.0.1", "::1" */
-    int port;       /* 0: any, and open sets the one chosen */
-    bool any_host;  /* accepts any Host name (for a proxy), not only loopback names */
+    const char *ip;    /* "127.0.0.1", "::1" */
+    int port;          /* 0: any, and open sets the one chosen */
+    bool remote;       /* other machines may connect: Host may also be an IP address, this machine's name, or */
+    const char *hosts; /* one of these, "a,b"; NULL: none */
 } pal_listen_address;
 
 struct pal_transport_ops {

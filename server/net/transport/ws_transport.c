@@ -2,10 +2,12 @@
  *
  * Measured facts it keeps to: tx_packet_size 1 MiB; no extensions, ever (permessage-deflate can abort
  * the process); one lws_write per writable callback; protocols[0] takes connections without a subprotocol unchecked, so
- * they are denied there; HTTP_CONFIRM_UPGRADE is not handled. The listening socket is our own and every accepted socket
- * is adopted: so a port in use has a clear sentence, and socket options are set before the first byte.
- * What is received: at most 4096 bytes a message. Browsers: Origin must be this host; on a loopback address Host must
- * be a loopback name as well, so that no foreign name that resolves here reaches the server (DNS rebinding). */
+ * they are denied there; HTTP_CONFIRM_UPGRADE is not handled. Its time limits do not hold for an upgrade to HTTP/2 nor
+ * for CONNECT, so every socket has a deadline of its own until it is a websocket. The listening socket is our own and
+ * every accepted socket is adopted: so a port in use has a clear sentence, and socket options are set before the first
+ * byte. What is received: at most 4096 bytes a message. Browsers: Origin must be this host, and Host a loopback name;
+ * where other machines may connect, also an IP address, this machine's name or one that is listed. So no page reaches
+ * the server by a foreign name that resolves here (DNS rebinding). */
 #include "protocol/control.h"
 #include "server/base/log.h"
 #include "server/net/transport/transport.h"
@@ -23,13 +25,16 @@
 #include <unistd.h>
 
 enum { CHUNK = 64 << 10, HEADERS = 4096, SEND_QUEUE = 16 << 10, UNACKED_MS = 15000, DROP_S = 2, BACKLOG = 128 };
+/* us; longer than lws keeps an idle connection (keepalive_timeout) */
+static const lws_usec_t DEADLINE_US = 10000000;
 _Static_assert((int)PAL_PACKET_HEADROOM >= LWS_PRE, "a packet has room for the websocket header");
 
 struct pal_transport {
     pal_peer_events events;
     struct lws_vhost *vhost;
     int listen_fd, spare_fd; /* spare: given up to turn a caller away when descriptors run out */
-    bool any_host, adopted;  /* adopted: lws closes listen_fd with the loop */
+    bool remote, adopted;    /* adopted: lws closes listen_fd with the loop */
+    char *hosts;             /* names by which it is reached, "a,b"        */
     uint8_t chunk[LWS_PRE + CHUNK];
 };
 
@@ -53,25 +58,46 @@ static pal_transport *transport_of(struct lws *wsi)
 
 /* ---- who may come ---- */
 
-static bool loopback_host(const char *host)
+/* the name of "name", "name:port", "[address]" or "[address]:port", without brackets; false: it is none of them */
+static bool name_of_host(const char *host, char *name, size_t cap)
 {
-    const char *end = *host == '[' ? strchr(host, ']') : strchr(host, ':');
-    size_t n = end ? (size_t)(end - host) + (*host == '[') : strlen(host);
+    const bool v6 = *host == '[';
+    const char *from = host + v6, *end = from + strcspn(from, v6 ? "]" : ":"), *port = end + (v6 && *end);
+    if (end == from || (size_t)(end - from) >= cap || (v6 && !*end)) return false;
+    memcpy(name, from, (size_t)(end - from));
+    name[end - from] = 0;
+    return *port == 0 || (*port == ':' && port[1] && !port[1 + strspn(port + 1, "0123456789")]);
+}
+
+/* is it one of "a,b,c"? */
+static bool is_listed(const char *list, const char *name)
+{
+    const size_t n = strlen(name);
+    for (const char *at = list; at && *at; at += strcspn(at, ","), at += *at == ',')
+        if (strcspn(at, ",") == n && !strncasecmp(at, name, n)) return true;
+    return false;
+}
+
+/* A page of a stranger can have any name lead here, but no address and not this machine's own name */
+static bool name_allowed(const pal_transport *t, const char *name)
+{
     struct in_addr v4;
-    char name[64];
-    if (n >= sizeof name) return false;
-    memcpy(name, host, n);
-    name[n] = 0;
-    if (!strcasecmp(name, "localhost") || !strcmp(name, "[::1]")) return true;
-    return inet_pton(AF_INET, name, &v4) == 1 && ntohl(v4.s_addr) >> 24 == 127;
+    struct in6_addr v6;
+    char own[256] = "";
+    const bool is_v4 = inet_pton(AF_INET, name, &v4) == 1;
+    if (!strcasecmp(name, "localhost") || !strcmp(name, "::1") || (is_v4 && ntohl(v4.s_addr) >> 24 == 127)) return true;
+    if (!t->remote) return false;
+    if (is_v4 || inet_pton(AF_INET6, name, &v6) == 1 || is_listed(t->hosts, name)) return true;
+    return !gethostname(own, sizeof own - 1) && own[0] && !strcasecmp(name, own);
 }
 
 /* copies the host of the request; false: there is none, it has other than harmless characters, or it is not allowed */
 static bool host_allowed(struct lws *wsi, char *host, int cap)
 {
     static const char harmless[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-_:[]";
+    char name[256];
     if (lws_hdr_copy(wsi, host, cap, WSI_TOKEN_HOST) <= 0 || host[strspn(host, harmless)]) return false;
-    return transport_of(wsi)->any_host || loopback_host(host);
+    return name_of_host(host, name, sizeof name) && name_allowed(transport_of(wsi), name);
 }
 
 /* native clients send no Origin; a page's must be this very host */
@@ -148,6 +174,7 @@ static int begin_reply(struct lws *wsi, request *r, const char *path)
     char host[256];
     bool head = lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
     if (lws_get_network_wsi(wsi) != wsi) return -1;
+    lws_set_timer_usecs(wsi, DEADLINE_US);
     if (!host_allowed(wsi, host, sizeof host)) return deny(wsi, 403);
     if (!head && lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0) return deny(wsi, 405);
     t->events.get(t->events.user, path, &reply);
@@ -183,6 +210,7 @@ static int continue_reply(struct lws *wsi, request *r)
         return complete(wsi);
     }
     lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, 30);
+    lws_set_timer_usecs(wsi, 3 * DEADLINE_US);
     lws_callback_on_writable(wsi);
     return 0;
 }
@@ -198,6 +226,8 @@ static int http_callback(struct lws *wsi, enum lws_callback_reasons reason, void
         return begin_reply(wsi, r, in);
     case LWS_CALLBACK_HTTP_WRITEABLE:
         return continue_reply(wsi, r);
+    case LWS_CALLBACK_TIMER:
+        return -1;
     case LWS_CALLBACK_CLOSED_HTTP:
     case LWS_CALLBACK_HTTP_DROP_PROTOCOL:
         if (r) pal_packet_replace(&r->body, NULL);
@@ -227,6 +257,7 @@ static int established(struct lws *wsi, connection *c)
     c->wsi = wsi;
     c->peer.ops = &pal_ws_transport;
     c->open = true;
+    lws_set_timer_usecs(wsi, LWS_SET_TIMER_USEC_CANCEL);
     t->events.opened(t->events.user, &c->peer, session ? session : "");
     return 0;
 }
@@ -306,7 +337,8 @@ static void accept_all(pal_transport *t)
         int fd = accept4(t->listen_fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
         if (fd >= 0) {
             tune(fd);
-            lws_adopt_socket_vhost(t->vhost, fd); /* closes it when it cannot */
+            struct lws *wsi = lws_adopt_socket_vhost(t->vhost, fd); /* closes it when it cannot */
+            if (wsi) lws_set_timer_usecs(wsi, DEADLINE_US);
             continue;
         }
         if (errno == EINTR || errno == ECONNABORTED) continue;
@@ -352,7 +384,9 @@ static pal_err open_socket(pal_transport *t, pal_listen_address *from, pal_diagn
     if (from->port < 0 || from->port > UINT16_MAX || inet_pton(address.any.sa_family, from->ip, ip) != 1)
         return PAL_REFUSE(diag, "%s is not an address to listen on", name);
     *port = htons((uint16_t)from->port);
-    t->any_host = from->any_host;
+    t->remote = from->remote;
+    t->hosts = strdup(from->hosts ? from->hosts : "");
+    if (!t->hosts) return PAL_ERR_MEMORY;
     t->spare_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
     t->listen_fd = socket(address.any.sa_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (t->listen_fd < 0) return pal_diagnostic_set(diag, PAL_ERR_IO, "no socket: %s", strerror(errno));
@@ -373,6 +407,7 @@ static void ws_close(pal_transport *transport)
     if (!transport) return;
     if (!transport->adopted && transport->listen_fd >= 0) close(transport->listen_fd);
     if (transport->spare_fd >= 0) close(transport->spare_fd);
+    free(transport->hosts);
     free(transport);
 }
 
