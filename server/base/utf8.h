@@ -25,11 +25,20 @@ static inline int pal_utf8_next(const char *text, size_t n_byte, uint32_t *code)
 }
 
 /* May this character appear in a name or title? Control characters, line and paragraph separators, direction marks and
- * overrides, zero-width characters and the byte order mark may not. */
+ * overrides, and what nobody sees (of zero width, fillers, variation selectors, tags) may not. */
 static inline bool pal_utf8_printable(uint32_t c)
 {
-    return !(c < 0x20 || (c >= 0x7f && c < 0xa0) || (c >= 0x200b && c <= 0x200f) || (c >= 0x2028 && c <= 0x202e) ||
-             (c >= 0x2060 && c <= 0x206f) || c == 0xfeff);
+    return !(c < 0x20 || (c >= 0x7f && c < 0xa0) || c == 0xad || c == 0x34f || c == 0x61c || c == 0x115f ||
+             c == 0x1160 || (c >= 0x180b && c <= 0x180e) || (c >= 0x200b && c <= 0x200f) ||
+             (c >= 0x2028 && c <= 0x202e) || (c >= 0x2060 && c <= 0x206f) || c == 0x3164 ||
+             (c >= 0xfe00 && c <= 0xfe0f) || c == 0xfeff || c == 0xffa0 || (c >= 0xe0000 && c <= 0xe0fff));
+}
+
+/* a blank of any width */
+static inline bool pal_utf8_blank(uint32_t c)
+{
+    return c == ' ' || c == 0xa0 || c == 0x1680 || (c >= 0x2000 && c <= 0x200a) || c == 0x202f || c == 0x205f ||
+           c == 0x3000;
 }
 
 /* is all of a text well-formed and printable? */

@@ -41,7 +41,7 @@ static pal_packet *members_message(const pal_hub_room *room)
         const pal_member_entry *from = &room->members.member[i];
         if (!from->id) continue;
         pal_wire_member *to = &m->member[m->n_member++];
-        to->id = pal_stream_wire_id(from->id);
+        to->id = (uint16_t)from->id;
         to->role = (pal_wire_role)from->role;
         to->tool = from->tool >= 0 ? from->tool : PAL_WIRE_TOOL_NONE;
         to->colour = pal_hub_colour(from->id);

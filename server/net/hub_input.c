@@ -46,7 +46,7 @@ static void send_hello(pal_client *c)
     pal_hub_put_plan(c->room, &hello->plan);
     hello->estimates = true;
     hello->credit = (uint32_t)c->credit.max;
-    hello->you_id = pal_stream_wire_id(m->id);
+    hello->you_id = (uint16_t)m->id;
     hello->you_role = (pal_wire_role)m->role;
     hello->you_tool = m->tool >= 0 ? m->tool : PAL_WIRE_TOOL_NONE;
     pal_plain_text(hello->you_name, sizeof hello->you_name, m->name);

@@ -163,11 +163,6 @@ double pal_stream_rate_hz(const pal_stream *stream)
     return fmin(1 / stream->scene->step_s, PAL_STREAM_RATE_HZ);
 }
 
-uint16_t pal_stream_wire_id(int member)
-{
-    return (uint16_t)(member > 0 ? (member - 1) % UINT16_MAX + 1 : 0);
-}
-
 static uint64_t time_us(double time_s)
 {
     return time_s > 0 ? (uint64_t)(time_s * 1e6) : 0;
@@ -246,7 +241,7 @@ static void put_tools(pal_stream *s, uint64_t now_ns, const pal_stream_tool tool
     for (int i = 0; i < s->frame->n_tool; i++) {
         const pal_frame_tool *f = &s->frame->tool[i];
         pal_wire_tool *to = &w.tool[i];
-        to->holder = pal_stream_wire_id(tool[i].holder);
+        to->holder = (uint16_t)tool[i].holder;
         to->colour = tool[i].holder ? tool[i].colour : 0;
         to->flags = (uint16_t)((tool[i].holder ? PAL_WIRE_TOOL_HELD : 0) | (f->touching ? PAL_WIRE_TOOL_CONTACT : 0) |
                                (f->holding ? PAL_WIRE_TOOL_GRASPS : 0) | (f->present ? 0 : PAL_WIRE_TOOL_AWAY) |
@@ -269,7 +264,7 @@ static void copy_patch(pal_wire_contact_patch *to, const pal_contact_patch *from
 {
     double p[3];
     for (int i = 0; i < 3; i++) p[i] = from->point_m[i] - origin[i];
-    to->id = pal_stream_wire_id(from->id);
+    to->id = (uint16_t)(from->id > 0 ? (from->id - 1) % UINT16_MAX + 1 : 0);
     to->group = (uint16_t)from->group;
     copy_f3(to->p_m, p);
     copy_f3(to->n, from->normal);

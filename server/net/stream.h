@@ -83,8 +83,6 @@ typedef struct pal_stream_tool {
 
 /* what the server knows of the devices of held tools; device [PAL_TOOL_MAX], returns how many */
 int pal_stream_devices(const pal_stream *stream, const pal_stream_tool tool[PAL_TOOL_MAX], pal_wire_device *device);
-/* the 16-bit wire form of a member id, which grows without bound; 0 stays 0 */
-uint16_t pal_stream_wire_id(int member);
 /* Takes the session's newest frame and makes a cycle of it: encodes the tiers with used[] true, tools, and contact
  * models. now_ns: time of the session's clock. false: no new frame. */
 bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_STREAM_TIER_COUNT],

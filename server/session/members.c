@@ -26,8 +26,8 @@ static void clean_name(const char *from, char to[PAL_MEMBER_NAME])
         int size = pal_utf8_next(from + at, n_from - at, &code);
         const char *piece = from + at;
         at += size ? (size_t)size : 1;
-        if (size && code == ' ') blank = n > 0;
-        if (!size || code == ' ' || !pal_utf8_printable(code)) continue;
+        if (size && pal_utf8_blank(code)) blank = n > 0;
+        if (!size || pal_utf8_blank(code) || !pal_utf8_printable(code)) continue;
         if (n + blank + (size_t)size > PAL_MEMBER_NAME - 1 - NAME_NUMBER) break;
         if (blank) to[n++] = ' ';
         blank = false;
@@ -38,11 +38,56 @@ static void clean_name(const char *from, char to[PAL_MEMBER_NAME])
     if (n == 0) strcpy(to, "guest");
 }
 
+/* the Latin small letter or digit that a character is taken for, of those that Cyrillic and Greek share with Latin and
+ * of 0 and 1 (after Unicode Technical Standard 39, confusables); else itself */
+static uint32_t looks_like(uint32_t c)
+{
+    static const struct {
+        uint32_t from[4];
+        char to;
+    } same[] = {
+        {{0x430, 0x410, 0x391, 0x3b1}, 'a'}, {{0x412, 0x392, 0x432, 0}, 'b'},     {{0x441, 0x421, 0x3f9, 0}, 'c'},
+        {{0x501, 0x500, 0, 0}, 'd'},         {{0x435, 0x415, 0x395, 0}, 'e'},     {{0x4bb, 0x41d, 0x397, 0}, 'h'},
+        {{0x456, 0x406, 0x399, 0x3b9}, 'l'}, {{0x458, 0x408, 0, 0}, 'j'},         {{0x43a, 0x41a, 0x39a, 0x3ba}, 'k'},
+        {{0x43c, 0x41c, 0x39c, 0}, 'm'},     {{0x39d, 0x578, 0, 0}, 'n'},         {{0x43e, 0x41e, 0x39f, 0x3bf}, 'o'},
+        {{0x440, 0x420, 0x3a1, 0x3c1}, 'p'}, {{0x51b, 0x51a, 0, 0}, 'q'},         {{0x455, 0x405, 0, 0}, 's'},
+        {{0x442, 0x422, 0x3a4, 0x3c4}, 't'}, {{0x3bd, 0x475, 0x474, 0}, 'v'},     {{0x51d, 0x51c, 0, 0}, 'w'},
+        {{0x445, 0x425, 0x3a7, 0x3c7}, 'x'}, {{0x443, 0x423, 0x3a5, 0x3b3}, 'y'}, {{0x396, 0, 0, 0}, 'z'}};
+    if (c == '0') return 'o';
+    if (c == '1' || c == 'i' || c == 'I' || c == '|') return 'l';
+    if (c < 0x80) return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c;
+    for (size_t k = 0; k < sizeof same / sizeof *same; k++)
+        for (int i = 0; i < 4; i++)
+            if (same[k].from[i] == c) return (uint32_t)same[k].to;
+    return c;
+}
+
+static bool looks_the_same(const char *a, const char *b)
+{
+    uint32_t x = 0, y = 0;
+    for (int n, m; *a && *b; a += n, b += m) {
+        n = pal_utf8_next(a, strlen(a), &x), m = pal_utf8_next(b, strlen(b), &y);
+        if (!n || !m || looks_like(x) != looks_like(y)) return false;
+    }
+    return !*a && !*b;
+}
+
 static bool name_taken(const pal_member_list *members, const char *name)
 {
     for (int k = 0; k < PAL_MEMBER_LIST_MAX; k++)
-        if (members->member[k].id && !strcmp(members->member[k].name, name)) return true;
+        if (members->member[k].id && looks_the_same(members->member[k].name, name)) return true;
     return false;
+}
+
+/* the next number that nobody has; after the last one the count begins again */
+static int take_id(pal_member_list *members)
+{
+    int id;
+    do {
+        id = members->next_id;
+        members->next_id = id % PAL_MEMBER_ID_MAX + 1;
+    } while (pal_members_find(members, id));
+    return id;
 }
 
 pal_err pal_members_join(pal_member_list *members, pal_member_role role, const char *name, int *id)
@@ -55,7 +100,7 @@ pal_err pal_members_join(pal_member_list *members, pal_member_role role, const c
     clean_name(name, plain);
     snprintf(full, sizeof full, "%s", plain);
     for (int number = 2; name_taken(members, full); number++) snprintf(full, sizeof full, "%s %d", plain, number);
-    *entry = (pal_member_entry){.id = members->next_id++, .role = role, .tool = -1};
+    *entry = (pal_member_entry){.id = take_id(members), .role = role, .tool = -1};
     snprintf(entry->name, sizeof entry->name, "%.*s", PAL_MEMBER_NAME - 1, full);
     members->n_member++;
     *id = entry->id;

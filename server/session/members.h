@@ -5,14 +5,15 @@
 #define PAL_SESSION_MEMBERS_H
 #include "server/sim/core/tools.h"
 
-enum { PAL_MEMBER_LIST_MAX = 64, PAL_MEMBER_NAME = 48 };
+enum { PAL_MEMBER_LIST_MAX = 64, PAL_MEMBER_NAME = 48, PAL_MEMBER_ID_MAX = 65535 };
 
 typedef enum pal_member_role { PAL_MEMBER_VIEWER, PAL_MEMBER_TRAINEE, PAL_MEMBER_INSTRUCTOR } pal_member_role;
 
 typedef struct pal_member_entry {
-    int id; /* > 0, never reused; 0: free entry */
+    int id; /* 1 .. PAL_MEMBER_ID_MAX, never that of another member; 0: free entry */
     pal_member_role role;
-    char name[PAL_MEMBER_NAME]; /* UTF-8, control characters removed; made unique by a number */
+    char name[PAL_MEMBER_NAME]; /* UTF-8, control characters removed; made unique by a number, also where
+                                 * another only looks the same */
     int tool;                   /* index of the tool that the member holds; -1: none */
 } pal_member_entry;
 

@@ -57,6 +57,44 @@ static void a_long_name_is_cut_at_a_whole_character(void)
     }
 }
 
+/* a trainee whose name reads as the instructor's gives orders that everybody takes for the instructor's */
+static void a_name_that_looks_like_another_gets_a_number(void)
+{
+    static const char *const alike[] = {"Ada",
+                                        "\xd0\x90"
+                                        "da",
+                                        "ADA",
+                                        "Ada\xc2\xa0",
+                                        "Ada\xf3\xa0\x81\xa1",
+                                        "A\xc2\xad"
+                                        "da"};
+    pal_members_init(&list, 3);
+    for (size_t k = 0; k < sizeof alike / sizeof *alike; k++) {
+        const char *name = name_of(join(PAL_MEMBER_TRAINEE, alike[k]));
+        char number[8] = "";
+        if (k > 0) snprintf(number, sizeof number, " %zu", k + 1);
+        if (strlen(name) < strlen(number) || strcmp(name + strlen(name) - strlen(number), number) != 0)
+            CHECK_FAIL("%zu: %s", k, name);
+    }
+    CHECK_TEXT(name_of(join(PAL_MEMBER_TRAINEE, "Bob Illi")), "Bob Illi");
+    CHECK_TEXT(name_of(join(PAL_MEMBER_TRAINEE, "B0b l111")), "B0b l111 2");
+    CHECK_TEXT(name_of(join(PAL_MEMBER_TRAINEE, "\xd0\x90\xd0\xbd\xd0\xbd\xd0\xb0")),
+               "\xd0\x90\xd0\xbd\xd0\xbd\xd0\xb0");
+}
+
+/* clients find themselves by their id, 16 bits on the wire: 65,534 joins once gave a stranger another's */
+static void an_id_in_use_is_not_given_again(void)
+{
+    pal_members_init(&list, 3);
+    const int ada = join(PAL_MEMBER_TRAINEE, "Ada");
+    for (int k = 0; k < 2 * PAL_MEMBER_ID_MAX; k++) {
+        const int id = join(PAL_MEMBER_VIEWER, "v");
+        if (id == ada || id < 1 || id > PAL_MEMBER_ID_MAX) CHECK_FAIL("join %d has id %d", k, id);
+        pal_members_leave(&list, id);
+    }
+    CHECK_TEXT(name_of(ada), "Ada");
+}
+
 static void a_full_table_refuses_and_an_id_is_never_used_twice(void)
 {
     pal_members_init(&list, 3);
@@ -112,6 +150,8 @@ int main(void)
     RUN(names_are_made_unique_by_a_number);
     RUN(names_lose_control_and_direction_characters_and_broken_bytes);
     RUN(a_long_name_is_cut_at_a_whole_character);
+    RUN(a_name_that_looks_like_another_gets_a_number);
+    RUN(an_id_in_use_is_not_given_again);
     RUN(a_full_table_refuses_and_an_id_is_never_used_twice);
     RUN(a_tool_has_one_holder);
     RUN(viewers_hold_nothing);
