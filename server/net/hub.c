@@ -286,6 +286,7 @@ static void hub_tick(void *user)
     pal_hub *hub = user;
     uint64_t now = pal_loop_now_ns(hub->loop);
     hub_wake(hub);
+    pal_hub_hand_over_idle_tools(hub);
     for (int r = 0; r < hub->n_room; r++) {
         pal_stream_measure(hub->room[r].stream, now);
         pal_hub_update_subscriptions(&hub->room[r]);

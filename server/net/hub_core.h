@@ -51,6 +51,7 @@ typedef struct pal_client {
     /* a command about a component without an answer: deadline, 0: none; refusals of the session before it */
     uint64_t component_until_ns, component_refused;
     uint64_t pose_error_ns; /* last error about poses */
+    uint64_t waits_ns;      /* since when it waits for any tool; 0: it does not */
 } pal_client;
 
 /* a replaced asset; a client that knows its path may still request it */
@@ -86,6 +87,9 @@ typedef struct pal_hub_room {
     pal_hub_tool_brush brush[PAL_TOOL_MAX];
     pal_member_list members;
     pal_stream_tool tool[PAL_TOOL_MAX];
+    double moved_m[PAL_TOOL_MAX][3]; /* where each tool was, and its buttons, when it last moved, at moved_ns */
+    uint32_t moved_buttons[PAL_TOOL_MAX];
+    uint64_t moved_ns[PAL_TOOL_MAX];
     pal_material material[PAL_BODY_MAX]; /* as last requested */
     /* steps without output for lack of observers; tick and OUTPUT runs at the last count */
     uint64_t n_unobserved, seen_tick, seen_output;

@@ -3,6 +3,7 @@
  * is answered with `error`. Poses of a tool that the sender does not hold are ignored. */
 #include "server/net/hub_input.h"
 
+#include "server/base/vec3.h"
 #include "server/net/hub_fields.h"
 #include "server/net/hub_peers.h"
 #include "server/net/hub_plan.h"
@@ -12,8 +13,10 @@
 
 #include <string.h>
 
+static void leave(pal_client *c);
+
 /* takes a tool without notifying anyone */
-static pal_err take_tool(const pal_client *c, int wanted)
+static pal_err take_tool(pal_client *c, int wanted)
 {
     pal_hub_room *room = c->room;
     int before = pal_members_find(&room->members, c->id)->tool, taken = -1;
@@ -21,11 +24,47 @@ static pal_err take_tool(const pal_client *c, int wanted)
     if (before == taken) return PAL_ERR_OK;
     if (before >= 0) pal_hub_release_tool(room, before);
     room->tool[taken] = (pal_stream_tool){c->id, pal_hub_colour(c->id), pal_loop_now_ns(c->hub->loop)};
+    room->moved_ns[taken] = room->tool[taken].taken_ns;
+    c->waits_ns = 0;
     return PAL_ERR_OK;
+}
+
+/* the tool that has not been moved for the longest time, and for PAL_IDLE_NS; -1: none */
+static int find_idle_tool(const pal_hub_room *room, uint64_t now_ns)
+{
+    int found = -1;
+    for (int t = 0; t < room->members.n_tool; t++)
+        if (room->members.holder[t] && now_ns - room->moved_ns[t] > PAL_IDLE_NS &&
+            (found < 0 || room->moved_ns[t] < room->moved_ns[found]))
+            found = t;
+    return found;
+}
+
+void pal_hub_hand_over_idle_tools(pal_hub *hub)
+{
+    for (int r = 0; r < hub->n_room; r++) {
+        pal_hub_room *room = &hub->room[r];
+        const int tool = find_idle_tool(room, pal_loop_now_ns(hub->loop));
+        pal_client *next = NULL, *holder = NULL;
+        for (int i = 0; i < hub->max_clients; i++) {
+            pal_client *c = &hub->client[i];
+            if (!c->peer || !c->id || c->room != room) continue;
+            if (c->waits_ns && (!next || c->waits_ns < next->waits_ns)) next = c;
+            if (tool >= 0 && c->id == room->members.holder[tool]) holder = c;
+        }
+        if (tool < 0 || !next || !holder) continue;
+        leave(holder);
+        if (take_tool(next, tool)) continue;
+        pal_hub_refuse(holder, "tool_idle", "tool %d was not moved for %d s and is held by %s now", tool,
+                       (int)(PAL_IDLE_NS / 1000000000u), pal_members_find(&room->members, next->id)->name);
+        pal_hub_members_changed(room);
+    }
 }
 
 static void explain_take(pal_client *c, int wanted, pal_err err)
 {
+    if (err == PAL_ERR_STATE && wanted == PAL_WIRE_TOOL_ANY && !c->waits_ns)
+        c->waits_ns = pal_loop_now_ns(c->hub->loop);
     pal_member_list *members = &c->room->members;
     int holder = wanted >= 0 && wanted < members->n_tool ? members->holder[wanted] : 0;
     if (err == PAL_ERR_STATE && holder)
@@ -93,6 +132,7 @@ static void leave(pal_client *c)
 {
     pal_member_entry *m = pal_members_find(&c->room->members, c->id);
     int tool = m->tool;
+    c->waits_ns = 0;
     if (tool < 0) return;
     pal_members_release_tool(&c->room->members, c->id);
     pal_hub_release_tool(c->room, tool);
@@ -165,6 +205,12 @@ static int pose(pal_client *c, const uint8_t *bytes, size_t n_byte)
         p.force_N[i] = w.force_N[i];
     }
     for (int i = 0; i < 4; i++) p.quat[i] = w.quaternion[i];
+    if (pal_dist3(p.position_m, c->room->moved_m[m->tool]) > PAL_STILL_M ||
+        p.buttons != c->room->moved_buttons[m->tool]) {
+        pal_copy3(c->room->moved_m[m->tool], p.position_m);
+        c->room->moved_buttons[m->tool] = p.buttons;
+        c->room->moved_ns[m->tool] = now;
+    }
     /* a release is never refused */
     if (pal_session_request_pose(c->room->session, m->tool, w.flags & PAL_WIRE_POSE_AWAY ? NULL : &p))
         c->hub->count.n_pose_refused++;

@@ -75,6 +75,7 @@ void pal_hub_leave_room(pal_client *c)
     c->out_begin = c->n_out = 0;
     pal_packet_replace(&c->haptic, NULL);
     c->members_due = c->status_due = false;
+    c->waits_ns = 0;
     if (!c->id) return;
     unsubscribe_all(c);
     pal_member_entry *member = pal_members_find(&room->members, c->id);

@@ -25,6 +25,10 @@
 #define PAL_MESSAGES_1_S 600
 /* ns between two errors about poses to one client: a pose comes 250 times a second (test_hub) */
 #define PAL_POSE_ERROR_NS 1000000000u
+/* ns without a motion of PAL_STILL_M, m, after which a tool goes to who waits for one: longer than a trainee looks or
+ * listens between two touches, above the trembling of a hand that lies on its device (test_hub) */
+#define PAL_IDLE_NS 60000000000u
+#define PAL_STILL_M 1e-3
 /* s over which the error of a device's force is a mean: some models, and a few messages of status (test_hub) */
 #define PAL_FORCE_ERROR_S 1.0
 /* ns that a closing server waits for its clients to take the reason (test_ws) */

@@ -247,6 +247,49 @@ static void a_tool_has_one_holder(void)
     end();
 }
 
+static int tool_of(const mem_client *c)
+{
+    const pal_control *members = &c->last[PAL_CONTROL_MEMBERS];
+    for (uint32_t i = 0; i < members->members.n_member; i++)
+        if (members->members.member[i].id == c->last[PAL_CONTROL_HELLO].hello.you_id)
+            return members->members.member[i].tool;
+    return -2;
+}
+
+/* half a second: Ada moves her tool, Bob's device lies still */
+static void lie_still(mem_client *a, mem_client *b, mem_client *c, int k)
+{
+    const double moving[3] = {0.01 + 0.005 * (k % 2), 0, 0.3}, still[3] = {0.02 + 0.0002 * (k % 2), 0, 0.3};
+    mem_pose(a, 0, (uint32_t)k + 1, moving);
+    if (b) mem_pose(b, 1, (uint32_t)k + 1, still);
+    served_turn(500000000u, a, b);
+    mem_pull(c, 1000);
+}
+
+static void an_unmoved_tool_goes_to_who_waits_for_one(void)
+{
+    mem_client a, b, c;
+    begin(true, 0);
+    mem_join(&a, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    mem_join(&b, transport, "Bob", PAL_WIRE_ROLE_TRAINEE, 1);
+    mem_join(&c, transport, "Cat", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    for (int k = 0; k < 116; k++) lie_still(&a, &b, &c, k);
+    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].error.code, "tool_taken");
+    CHECK_INT(tool_of(&b), 1);
+    CHECK_INT(b.n_text[PAL_CONTROL_ERROR], 0);
+    for (int k = 116; k < 126; k++) lie_still(&a, &b, &c, k);
+    CHECK_INT(tool_of(&a), 0);
+    CHECK_INT(tool_of(&b), PAL_WIRE_TOOL_NONE);
+    CHECK_INT(tool_of(&c), 1);
+    CHECK_TEXT(b.last[PAL_CONTROL_ERROR].error.code, "tool_idle");
+    CHECK(strstr(b.last[PAL_CONTROL_ERROR].error.text, "held by Cat") != NULL);
+    /* nobody waits: it is kept, however still it lies */
+    for (int k = 126; k < 270; k++) lie_still(&a, NULL, &c, k), mem_pull(&b, 1000);
+    CHECK_INT(tool_of(&c), 1);
+    mem_end(&a), mem_end(&b), mem_end(&c);
+    end();
+}
+
 static void pose_of_the_holder_moves_the_tool_and_is_echoed(void)
 {
     mem_client a, b;
@@ -621,6 +664,7 @@ int main(void)
     RUN(slow_client_gets_coarser_frames_and_finer_ones_when_it_keeps_up);
     RUN(numbers_grow_through_every_change_of_tier);
     RUN(a_tool_has_one_holder);
+    RUN(an_unmoved_tool_goes_to_who_waits_for_one);
     RUN(pose_of_the_holder_moves_the_tool_and_is_echoed);
     RUN(force_of_a_device_is_compared_with_the_servers);
     RUN(viewer_moves_no_tool_and_gives_no_command);
