@@ -259,20 +259,12 @@ static void servo_move_frame(pal_servo *s)
     pal_workspace_restart(&s->place);
 }
 
-/* The force that the device gives: what it tells where that is a part of the command, because it limits or filters */
-static const double *servo_given(const pal_servo *s)
-{
-    const double *reported = s->device.force_N, *to = s->force_prev;
-    return s->device.has_force && pal_dot3(reported, to) >= 0 && pal_norm3(reported) <= pal_norm3(to) ? reported : to;
-}
-
 /* Work of the hand on the device since the last pose. The motors follow a command one tick and MOTOR_TIME_S late: a
- * spring gives energy by that, which the damping floor takes and the tank must not count as income. A device that tells
- * what it gives of a command, because it limits or filters, is believed */
+ * spring gives energy by that, which the damping floor takes and the tank must not count as income */
 static double servo_work(pal_servo *s, double dt)
 {
     const double left = exp(-dt / MOTOR_TIME_S), mean = (1 - left) * MOTOR_TIME_S / dt;
-    const double *moved[2] = {s->place.step_d, s->place.turn_d}, *next[2] = {servo_given(s), s->torque_prev};
+    const double *moved[2] = {s->place.step_d, s->place.turn_d}, *next[2] = {s->force_prev, s->torque_prev};
     double work = 0;
     for (int i = 0; i < 2; i++)
         for (int k = 0; k < 3; k++) {

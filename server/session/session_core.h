@@ -25,6 +25,9 @@ typedef struct session_tool {
     pal_pose pose;
     uint64_t arrived_ns;
     bool present, brushes; /* brushes: a brush began since the last release */
+    double seen_m[3];      /* of the last pose taken, applied or not           */
+    uint64_t seen_ns;      /* when that arrived; 0: the tool was away           */
+    uint64_t jumped_ns;    /* when the last one arrived that no hand can reach  */
 } session_tool;
 
 /* Disabled components of the plan, by name: they stay disabled across any number of successive sessions, including

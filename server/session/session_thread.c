@@ -7,6 +7,7 @@
 
 #include "server/base/log.h"
 #include "server/base/thread.h"
+#include "server/base/vec3.h"
 #include "server/session/tuning.h"
 
 #include <math.h>
@@ -78,6 +79,19 @@ static void publish(pal_session *s)
     if (s->options.wake) s->options.wake(s->options.user);
 }
 
+/* Has the tool jumped lately, by more than a hand moves? It counts as lifted then, and is put down where it comes to
+ * rest: a tool that tears tissue to and fro costs everybody's time */
+static bool is_lifted(const pal_session *s, session_tool *tool, const requested_pose *to)
+{
+    const double speed_m_s = fmax(PAL_HAND_M_S, s->reach_m / PAL_POSE_REACH / PAL_HAND_SIZE_S),
+                 passed_s = 1e-9 * (double)(to->arrived_ns - tool->seen_ns);
+    if (tool->seen_ns && pal_dist3(to->pose.position_m, tool->seen_m) > speed_m_s * fmax(passed_s, PAL_HAND_SLACK_S))
+        tool->jumped_ns = to->arrived_ns;
+    pal_copy3(tool->seen_m, to->pose.position_m);
+    tool->seen_ns = to->arrived_ns;
+    return tool->jumped_ns && to->arrived_ns - tool->jumped_ns < PAL_LIFT_NS;
+}
+
 /* copies the newest pose of every tool to the world and releases tools whose lease has expired; true: one changed */
 static bool take_poses(pal_session *s, uint64_t now)
 {
@@ -87,7 +101,10 @@ static bool take_poses(pal_session *s, uint64_t now)
         const requested_pose *slot = pal_triple_buffer_take(&tool->triple_buffer);
         bool gone = tool->present && now > tool->arrived_ns && now - tool->arrived_ns > s->lease_ns;
         pal_input_record record = {.index = t, .step = s->step};
-        if (slot && slot->present && (now < slot->arrived_ns || now - slot->arrived_ns <= s->lease_ns)) {
+        const bool fresh = slot && slot->present && (now < slot->arrived_ns || now - slot->arrived_ns <= s->lease_ns),
+                   lifted = fresh && is_lifted(s, tool, slot);
+        if (!fresh && (slot || gone)) tool->seen_ns = 0;
+        if (fresh && !lifted) {
             if (pal_world_pose(s->world, t, &slot->pose)) {
                 count_refusal(s);
                 continue;

@@ -8,6 +8,13 @@
 #define PAL_POSE_REACH 100
 /* fraction of a step: a step is late when it begins so long after its due time (test_session) */
 #define PAL_LATE_PART 0.1
+/* m/s: what no hand exceeds (test_session); larger bodies are worked on at a larger scale: their size in so many s.
+ * Poses come in bursts: s that one may lie before the last. ns without a jump after which a tool that jumped is put
+ * down */
+#define PAL_HAND_M_S     5.0
+#define PAL_HAND_SIZE_S  0.05
+#define PAL_HAND_SLACK_S 0.01
+#define PAL_LIFT_NS      100000000u
 /* ns between two writes of the input log, and the longest wait of its closing (test_replay) */
 #define PAL_LOG_FLUSH_NS 20000000u
 /* ns between two fdatasync of the input log: what kill -9 or a power cut may cost (test_replay) */

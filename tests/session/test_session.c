@@ -81,6 +81,47 @@ static pal_session *open_unpaced(double lease_s, published *p)
 
 /* ---- tests ---- */
 
+/* steps in which the tool is there while it goes to and fro by way_m in each of n steps of 5 ms */
+static int present_steps(double way_m, int n)
+{
+    pal_session *s = open_with((pal_session_options){.lease_s = 10});
+    int there = 0;
+    for (int k = 0; s && k < n; k++) {
+        const pal_pose pose = {
+            .position_m = {way_m * (k % 2), 0, 0.3}, .quat = {1, 0, 0, 0}, .buttons = 1, .seq = (uint32_t)k + 1};
+        CHECK_INT(pal_session_request_pose(s, 0, &pose), 0);
+        there += stepped_steps(s, 1)->tool[0].present;
+    }
+    pal_session_close(s);
+    return there;
+}
+
+/* 5 m/s for 10 ms are 50 mm */
+static void a_tool_that_jumps_is_lifted_until_it_rests(void)
+{
+    CHECK_INT(present_steps(0.049, 40), 40);
+    CHECK_INT(present_steps(0.051, 40), 1);
+    /* one jump: lifted for 100 ms, 20 steps, then put down there */
+    pal_session *s = open_with((pal_session_options){.lease_s = 10});
+    REQUIRE(s != NULL);
+    pal_pose pose = {.position_m = {0, 0, 0.3}, .quat = {1, 0, 0, 0}};
+    for (int k = 0; k < 50; k++) {
+        pose.seq++;
+        pose.position_m[0] = k < 10 ? 0 : 0.2;
+        CHECK_INT(pal_session_request_pose(s, 0, &pose), 0);
+        const pal_frame *f = stepped_steps(s, 1);
+        CHECK_INT(f->tool[0].present, k < 10 || k >= 30);
+        if (k >= 30) CHECK_NEAR(f->tool[0].pose.position_m[0], 0.2, 1e-12);
+    }
+    /* a tool that was away is no jump, however far it comes back */
+    CHECK_INT(pal_session_request_pose(s, 0, NULL), 0);
+    CHECK(!stepped_steps(s, 1)->tool[0].present);
+    pose.position_m[0] = -0.2;
+    CHECK_INT(pal_session_request_pose(s, 0, &pose), 0);
+    CHECK(stepped_steps(s, 1)->tool[0].present);
+    pal_session_close(s);
+}
+
 static void steps_follow_the_clock_and_time_is_ticks_times_step(void)
 {
     pal_session *s = open_with((pal_session_options){0});
@@ -587,6 +628,7 @@ int main(void)
     counting = true;
     /* sanitizers look at where threads meet; the size of the ball is not their matter */
     if (!small_scene(&scene, &mesh, CHECK_REPEATS(6, 4))) return 1;
+    RUN(a_tool_that_jumps_is_lifted_until_it_rests);
     RUN(steps_follow_the_clock_and_time_is_ticks_times_step);
     RUN(a_session_that_starts_paused_shows_rest_and_steps_one_by_one);
     RUN(reset_brings_the_rest_shape_back);
