@@ -459,6 +459,12 @@ static void change(refine *state, pal_step *step)
     pal_refine_balance_compute(&report->after, step);
 }
 
+/* sums of squared loads, up to what rounding and a body at rest change */
+static bool is_same(double load2, double before)
+{
+    return fabs(load2 - before) <= 1e-6 * load2;
+}
+
 /* true: an evaluation would see the same state as the last one */
 static bool is_still(refine *state, const pal_body *body, double dt_s, double *load2)
 {
@@ -472,7 +478,7 @@ static bool is_still(refine *state, const pal_body *body, double dt_s, double *l
     }
     state->time.moved_m += dt_s * sqrt(max2);
     return state->seen_revision == body->display.revision + 1 && state->time.moved_m < STILL_EDGES * state->edge_m &&
-           fabs(*load2 - state->time.seen_load2) <= 1e-6 * *load2;
+           is_same(*load2, state->time.seen_load2);
 }
 
 static bool evaluates(const refine *state)
@@ -496,7 +502,7 @@ static pal_err run(void *self, pal_step *step)
     if (same && state->time.clock_s - state->time.seen_s < state->dwell_s) return PAL_ERR_OK;
     state->seen_revision = step->body->display.revision + 1, state->time.seen_s = state->time.clock_s;
     state->time.seen_load2 = load2, state->time.moved_m = 0;
-    if (fabs(load2 - state->time.steady_load2) > STEADY_LOADS * load2) {
+    if (!is_same(load2, state->time.steady_load2)) {
         state->time.steady_s = state->time.clock_s, state->time.steady_load2 = load2;
         let_go(state);
     }

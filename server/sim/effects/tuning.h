@@ -16,6 +16,4 @@
 #define STILL_EDGES 1e-4
 /* of the energy without rigid motion. A smaller change at a switch is not worth a factor on the stiffness */
 #define RAMP_FROM 2.5e-3
-/* of the sum of squared loads. A smaller change does not make a face that was joined in vain worth another attempt */
-#define STEADY_LOADS 1e-2
 #endif

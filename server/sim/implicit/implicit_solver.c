@@ -419,7 +419,10 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
             core->reference = fmax(size, PAL_SOLVER_FLOOR * fmax(tau * load_size(core), left));
             core->reference = fmax(core->reference, tau * negligible_N(body) * sqrt(body->n_dof));
         }
-        double best = core->options.tolerance * (core->turns_back ? PAL_TURNING_SLACK : 1) * core->reference;
+        /* while inverted elements move the state is far from any that is asked for, and conjugate gradients lower the
+         * energy of the stage in every iteration */
+        const double tolerance = core->turns_back ? sqrt(core->options.tolerance) : core->options.tolerance;
+        double best = tolerance * core->reference;
         to->residual = core->reference > 0 ? left / core->reference : 0;
         to->converged = k > 0 && left <= best;
         if (to->converged || k == max || !isfinite(left)) {

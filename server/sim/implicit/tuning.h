@@ -11,9 +11,6 @@
  * no iteration (tests/sim/solvers/test_fem_dynamic.c), and energies that count as equal in a line search, as in Hager
  * and Zhang 2005 (tests/sim/solvers/test_fem_static.c) */
 #define PAL_SOLVER_FLOOR 1e-7
-/* the tolerance's factor while inverted elements move: conjugate gradients lower the energy of the stage in every
- * iteration, and the state is far from any that is asked for (tests/stability/test_fem_shapes.c) */
-#define PAL_TURNING_SLACK 10
 /* of 10 E h^2 (load_cap_N), the same for a body without loads: such forces move a node by the rounding of positions
  * (tests/stability/test_rest_after_cases.c) */
 #define PAL_UNLOADED_FLOOR 1e-11
