@@ -35,7 +35,7 @@ layout.stage = stage;
 const bodies = new BodySet(state, stage, (part, { positions, normals }) =>
     post({ type: "reuse", part, positions, normals }, [positions.buffer, normals.buffer]),
 );
-const poses = new PoseSender(state, post);
+const poses = new PoseSender(state, post, () => stage.size);
 const fields = new FieldDisplay(state, stage, send, layout);
 const marks = new ToolMarks(stage, htmlById("labels"));
 const panel = new PlanPanel(document, sendCommand);

@@ -3,6 +3,9 @@
 const POSE_MS = 16;
 const REST_MS = 50; // the server releases a silent tool
 const GRASP_WAIT_MS = 1500; // longest wait for the server to grasp the tissue
+// m/s and sizes of the scene a second: half of the speed at which the server takes a motion for a jump and lifts the tool
+const SPEED_M_S = 2.5;
+const SPEED_SIZES_S = 10;
 
 /** @typedef {{position: number[], since: number}} Anchor */
 
@@ -10,14 +13,33 @@ export class PoseSender {
     /**
      * @param {import("./app_state.js").AppState} state
      * @param {(message: import("./link.js").WorkerMessage) => void} post
+     * @param {() => number} size of the scene, m
      */
-    constructor(state, post) {
+    constructor(state, post, size) {
         this.state = state;
         this.post = post;
+        this.size = size;
         /** @type {Anchor | null} where the present grasp began */
         this.anchor = null;
         this.away = true;
         this.sentAt = 0;
+        /** @type {number[] | null} position of the last pose; null: the tool was away */
+        this.last = null;
+        /** the tool has not reached its target yet, because the pointer was faster than a hand */
+        this.behind = false;
+    }
+
+    /**
+     * The position on the way to `target` that a hand reaches by now.
+     * @param {number[]} target @param {number} now ms @returns {number[]}
+     */
+    reached(target, now) {
+        const { last } = this;
+        const speed = Math.max(SPEED_M_S, SPEED_SIZES_S * this.size());
+        const far = last ? Math.hypot(...target.map((v, i) => v - last[i])) : 0;
+        const share = (speed * Math.min(now - this.sentAt, REST_MS)) / 1000 / far;
+        this.behind = far > 0 && share < 1;
+        return last && this.behind ? last.map((v, i) => v + share * (target[i] - v)) : target;
     }
 
     /**
@@ -41,16 +63,19 @@ export class PoseSender {
         if (ownTool < 0) return;
         const now = performance.now();
         if (target) {
-            if (!moved && now - this.sentAt < REST_MS) return;
-            if (moved && now - this.sentAt < POSE_MS / 2 && !this.away) return;
-            const position = this.position(target, now);
+            const moves = moved || this.behind;
+            if (!moves && now - this.sentAt < REST_MS) return;
+            if (moves && now - this.sentAt < POSE_MS / 2 && !this.away) return;
+            const position = this.reached(this.position(target, now), now);
+            this.last = position;
             this.post({ type: "pose", tool: ownTool, position, grasp: target.grasp, away: false });
             this.away = false;
             this.sentAt = now;
         } else if (!this.away) {
             this.post({ type: "pose", tool: ownTool, position: null, grasp: false, away: true });
             this.away = true;
-            this.anchor = null;
+            this.anchor = this.last = null;
+            this.behind = false;
         }
     }
 }
