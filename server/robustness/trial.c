@@ -396,6 +396,10 @@ static void judge_steps(pal_trial *trial)
         trial->scale_J =
             fmax(trial->scale_J, PAL_NO_ENERGY * bears_N * pal_world_body(trial->world, b)->length_scale_m);
     }
+    /* a surface that refines holds its weight with other levels after a switch, and other energy by the difference of
+     * two meshes, which is a share of that */
+    for (int b = 0; b < trial->scene->n_body; b++)
+        if (pal_world_body(trial->world, b)->active) trial->scale_J = fmax(trial->scale_J, fabs(trial->rest_J));
     out->limit = energy_limit(trial);
     out->energy = judged ? trial->excess_J / trial->scale_J : (double)NAN;
     out->excluded_rise = judged ? trial->excluded_rise_J / trial->scale_J : (double)NAN;
