@@ -455,6 +455,12 @@ static void other_machines_come_by_address_or_by_a_listed_name(void)
         check_count++;
         if (status != kind[i].status) CHECK_FAIL("%s: status %d, wanted %d", kind[i].host, status, kind[i].status);
     }
+    char body[1024] = "";
+    size_t n = 0;
+    CHECK_INT(
+        raw_request(port, "GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n", head, sizeof head, body, sizeof body - 1, &n),
+        403);
+    CHECK(strstr(body, "--hosts") != NULL);
     /* a page of such a name may not open a websocket either */
     int fd = raw_connect(port);
     raw_send_text(fd, "GET /ws HTTP/1.1\r\nHost: evil.example\r\nOrigin: http://evil.example\r\n"

@@ -25,7 +25,7 @@
 #include <unistd.h>
 
 enum { CHUNK = 64 << 10, HEADERS = 4096, SEND_QUEUE = 16 << 10, UNACKED_MS = 15000, DROP_S = 2, BACKLOG = 128 };
-/* us; longer than lws keeps an idle connection (keepalive_timeout) */
+/* us; longer than lws keeps an idle connection (keepalive_timeout); three times that while a file is read (test_ws) */
 static const lws_usec_t DEADLINE_US = 10000000;
 _Static_assert((int)PAL_PACKET_HEADROOM >= LWS_PRE, "a packet has room for the websocket header");
 
@@ -117,10 +117,18 @@ static int deny(struct lws *wsi, unsigned status)
     return -1;
 }
 
+/* a name by which no browser may come: the words are for whoever has a name of this machine that is not known */
+static int deny_host(struct lws *wsi)
+{
+    (void)lws_return_http_status(wsi, 403, "unknown host name: if it is this server's, give it with --hosts");
+    return -1;
+}
+
 static int filter_upgrade(struct lws *wsi)
 {
     char host[256], path[64];
-    if (lws_get_network_wsi(wsi) != wsi || !host_allowed(wsi, host, sizeof host)) return deny(wsi, 403);
+    if (lws_get_network_wsi(wsi) != wsi) return deny(wsi, 403);
+    if (!host_allowed(wsi, host, sizeof host)) return deny_host(wsi);
     if (lws_hdr_copy(wsi, path, sizeof path, WSI_TOKEN_GET_URI) <= 0 || strcmp(path, "/ws")) return deny(wsi, 403);
     return origin_allowed(wsi, host) ? 0 : deny(wsi, 403);
 }
@@ -175,7 +183,7 @@ static int begin_reply(struct lws *wsi, request *r, const char *path)
     bool head = lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
     if (lws_get_network_wsi(wsi) != wsi) return -1;
     lws_set_timer_usecs(wsi, DEADLINE_US);
-    if (!host_allowed(wsi, host, sizeof host)) return deny(wsi, 403);
+    if (!host_allowed(wsi, host, sizeof host)) return deny_host(wsi);
     if (!head && lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0) return deny(wsi, 405);
     t->events.get(t->events.user, path, &reply);
     size_t n_body = reply.body ? reply.body->n_byte : 0;

@@ -10,14 +10,14 @@
  *
  * Departures. The paper has one threshold for both directions and flickers at it. Here a face keeps its state for
  * dwell_s, also where a finer neighbour would have it split, so that it switches at most 1/dwell_s times a second. A
- * face that was joined too early waits up to 8 times as long the next time; if it is then joined too early again while
- * the loads have not changed, it stays split until they do. A node with a lasting load is not removed.
- * New nodes first relax towards equilibrium with the others fixed, while they store more energy than there was before:
- * a bent coarse face has no strain, but its finer springs would.
- * The changes of one evaluation are one switch, which conserves energy, momentum and angular momentum. The stiffness
- * of springs and of anchors gets one factor each that keeps their energies and returns to 1 in ramp_s. The velocities
- * of the changed region (new nodes and those of changed mass), or of the whole body where it is too small, get a rigid
- * motion that restores both momenta, and their deviations from it are scaled to restore the total energy.
+ * face that was joined too early waits up to 8 times as long the next time. One that was split again four times under
+ * the same loads stays split until they change, so that a body at rest stops switching. A node with a lasting load is
+ * not removed. New nodes first relax towards equilibrium with the others fixed, while they store more energy than there
+ * was before: a bent coarse face has no strain, but its finer springs would. The changes of one evaluation are one
+ * switch, which conserves energy, momentum and angular momentum. The stiffness of springs and of anchors gets one
+ * factor each that keeps their energies and returns to 1 in ramp_s. The velocities of the changed region (new nodes and
+ * those of changed mass), or of the whole body where it is too small, get a rigid motion that restores both momenta,
+ * and their deviations from it are scaled to restore the total energy.
  *
  * Keys: force_N (default: 0.005 k_0 h_0; k_0 the spring constant and h_0 the mean edge of level 0), speed_m_s
  * (default: 0.05 h_0 sqrt(k_0/m_0)), curvature_1_m (default: 0.3/h_0); 0 disables a criterion, and with all three
@@ -182,7 +182,8 @@ static bool settled(const refine *state, int32_t face)
                 : ldexp(state->dwell_s, split ? state->backoff[face] : 0) * (1 - 1e-9));
 }
 
-/* A split soon after a join doubles the face's waiting time; under the same loads the longest is not waited twice */
+/* A split soon after a join, or under the loads of that join, doubles the face's waiting time; under the same loads
+ * the longest is not waited twice */
 static void note_split(refine *state, int32_t face)
 {
     const bool early = state->time.clock_s - state->switched_s[face] < ldexp(state->dwell_s, MAX_BACKOFF);
