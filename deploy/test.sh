@@ -137,6 +137,7 @@ if [ -z "$fast" ]; then
     step "an adaptive surface in the browser" sh "$tree/tests/browser/run.sh" adaptive "$build"
     step "sculpting in the browser" sh "$tree/tests/browser/run.sh" sculpt "$build"
     step "error against cost in the browser" sh "$tree/tests/browser/run.sh" accuracy "$build"
+    step "viewer, trainee and instructor in the browser" sh "$tree/tests/browser/run.sh" rights "$build"
     step "two browsers, a bridge and lcm-logger together" sh "$tree/tests/browser/run.sh" together "$build"
     message "building with sanitizers"
     wait

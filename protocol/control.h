@@ -18,8 +18,9 @@
 #define PAL_WIRE_NAME_BYTES    64
 #define PAL_WIRE_TEXT_BYTES    256
 #define PAL_WIRE_COMPONENT_MAX 64
-#define PAL_WIRE_MEMBER_MAX    256
+#define PAL_WIRE_MEMBER_MAX    64
 #define PAL_WIRE_MEMBER_NAME   32
+#define PAL_WIRE_ORDER_MAX     16
 #define PAL_WIRE_ARG_MAX       16
 #define PAL_WIRE_FIELDS_MAX    8 /* fields that a part may offer */
 #define PAL_WIRE_FIELD_BYTES   24
@@ -36,7 +37,8 @@
     X(HELLO, "hello", true)                /* first message of the server after join                          */       \
     X(TOPOLOGY, "topology", true)          /* parts changed: new epochs and assets                            */       \
     X(STATUS, "status", true)              /* 2-4 Hz                                                          */       \
-    X(MEMBERS, "members", true)            /* on every change: members and the tools they hold              */         \
+    X(MEMBERS, "members", true)            /* after changes, at most 4 Hz: members, their tools and rights          */ \
+    X(ORDERS, "orders", true)              /* after commands, at most 4 Hz: who gave which                        */   \
     X(ERROR, "error", true)                /* a request was refused, the connection stays                     */       \
     X(PONG, "pong", true)                  /* answer to ping                                                  */       \
     X(ANSWER, "answer", true)              /* result of a command: done, or the requested numbers             */       \
@@ -186,11 +188,31 @@ typedef struct pal_wire_member {
     int tool;        /* PAL_WIRE_TOOL_NONE when it holds none */
     uint32_t colour; /* 0xRRGGBB                         */
     char name[PAL_WIRE_MEMBER_NAME];
+    char
+        rights[PAL_WIRE_NAME_BYTES]; /* of a trainee, from instructors: "steer sculpt"; "": none, and not on the wire */
+    bool muted;                      /* may do nothing but watch; false is not on the wire */
 } pal_wire_member;
 typedef struct pal_wire_members {
     uint32_t n_member;
     pal_wire_member member[PAL_WIRE_MEMBER_MAX];
+    uint32_t n_locked;                     /* 0: not on the wire */
+    double locked_tool[PAL_WIRE_TOOL_MAX]; /* tools that only instructors may take */
+    bool locked;                           /* nobody but instructors may join; false is not on the wire */
 } pal_wire_members;
+
+/* a command that was carried out, and who gave it */
+typedef struct pal_wire_order {
+    uint16_t id; /* of the member */
+    char name[PAL_WIRE_MEMBER_NAME];
+    char verb[32];
+    char target[PAL_WIRE_NAME_BYTES];
+    char text[PAL_WIRE_LABEL_BYTES]; /* its numbers: "young_Pa 4500" */
+    double age_s;                    /* since then */
+} pal_wire_order;
+typedef struct pal_wire_orders {
+    uint32_t n_order;
+    pal_wire_order order[PAL_WIRE_ORDER_MAX]; /* oldest first; the newest of them, if there were more */
+} pal_wire_orders;
 
 typedef struct pal_wire_error {
     char code[PAL_WIRE_NAME_BYTES]; /* one word: "role", "tool_taken", "budget", "verb" ... */
@@ -282,6 +304,7 @@ typedef struct pal_control {
         pal_wire_topology topology;
         pal_wire_status status;
         pal_wire_members members;
+        pal_wire_orders orders;
         pal_wire_error error; /* error             */
         pal_wire_join join;
         pal_wire_command command; /* command               */

@@ -101,9 +101,22 @@ static const pal_control_field STATUS_fields[] = {
 static const pal_control_field member_fields[] = {
     {"id", U16, true, ONE(member, id)},         {"role", ROLE, true, ONE(member, role)},
     {"name", TEXT, true, ONE(member, name)},    {"tool", TOOL, false, ONE(member, tool)},
-    {"colour", U32, true, ONE(member, colour)}, {0}};
+    {"colour", U32, true, ONE(member, colour)}, {"rights", TEXT_OR_EMPTY, false, ONE(member, rights)},
+    {"muted", BOOL, false, ONE(member, muted)}, {0}};
 static const pal_control_field MEMBERS_fields[] = {
-    {"members", OBJECTS, true, LIST(members, member, n_member), member_fields}, {0}};
+    {"members", OBJECTS, true, LIST(members, member, n_member), member_fields},
+    {"locked_tools", NUMBERS, false, LIST(members, locked_tool, n_locked), NULL},
+    {"locked", BOOL, false, ONE(members, locked)},
+    {0}};
+static const pal_control_field order_fields[] = {{"id", U16, true, ONE(order, id)},
+                                                 {"name", TEXT, true, ONE(order, name)},
+                                                 {"verb", TEXT, true, ONE(order, verb)},
+                                                 {"target", TEXT_OR_EMPTY, false, ONE(order, target)},
+                                                 {"text", TEXT_OR_EMPTY, false, ONE(order, text)},
+                                                 {"age_s", F64, true, ONE(order, age_s)},
+                                                 {0}};
+static const pal_control_field ORDERS_fields[] = {{"orders", OBJECTS, true, LIST(orders, order, n_order), order_fields},
+                                                  {0}};
 static const pal_control_field ERROR_fields[] = {
     {"code", TEXT, true, ONE(error, code)}, {"text", TEXT, true, ONE(error, text)}, {0}};
 static const pal_control_field JOIN_fields[] = {{"name", TEXT, true, ONE(join, name)},

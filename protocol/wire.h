@@ -48,7 +48,8 @@ typedef enum pal_wire_close {
     PAL_WIRE_CLOSE_RATE = 4001,       /* more messages than the rate limit      */
     PAL_WIRE_CLOSE_STALLED = 4002,    /* no acknowledgement for 10 s            */
     PAL_WIRE_CLOSE_FULL = 4003,       /* session has no room for a further peer */
-    PAL_WIRE_CLOSE_NO_SESSION = 4004  /* session does not exist or has ended    */
+    PAL_WIRE_CLOSE_NO_SESSION = 4004, /* session does not exist or has ended    */
+    PAL_WIRE_CLOSE_REMOVED = 4005     /* an instructor has removed or banned the member */
 } pal_wire_close;
 
 /* first 8 bytes of every binary message */

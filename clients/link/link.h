@@ -55,7 +55,9 @@ typedef struct pal_link_events {
 } pal_link_events;
 
 typedef struct pal_link_options {
-    const char *url;  /* ws://host[:port][/path]; http:// is equivalent; default path "/ws"; copied */
+    const char *url;  /* ws://host[:port][/path][?session=NAME][#TICKET]; http:// is equivalent, so that the address
+                         that a server prints can be given; default path "/ws"; copied. Without a ticket there:
+                         that of the environment variable PALPATE_TICKET */
     const char *name; /* of the member; copied                                             */
     pal_wire_role role;
     int tool;             /* requested: index, PAL_WIRE_TOOL_ANY or PAL_WIRE_TOOL_NONE */

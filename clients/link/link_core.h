@@ -2,6 +2,7 @@
 #ifndef PAL_LINK_LINK_CORE_H
 #define PAL_LINK_LINK_CORE_H
 #include "clients/link/link.h"
+#include "protocol/ticket.h"
 
 #include <libwebsockets.h>
 #include <stdatomic.h>
@@ -30,9 +31,10 @@ struct pal_link_loop {
     link_watch *watches;
 };
 
-/* parts of ws://host[:port][/path] or http:// */
+/* parts of ws://host[:port][/path][?query][#ticket] or http:// */
 typedef struct link_address {
-    char host[LINK_HOST_BYTES], path[LINK_PATH_BYTES];
+    char host[LINK_HOST_BYTES], path[LINK_PATH_BYTES]; /* path and query */
+    char ticket[PAL_TICKET_TEXT];                      /* "": none       */
     int port;
 } link_address;
 pal_err link_address_parse(const char *url, link_address *out, pal_diagnostic *diag);

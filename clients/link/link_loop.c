@@ -8,6 +8,7 @@
 #include "server/base/log.h"
 
 #include <signal.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -199,7 +200,13 @@ pal_err link_address_parse(const char *url, link_address *out, pal_diagnostic *d
     if (!strncmp(url, "ws://", 5)) host = url + 5;
     if (!strncmp(url, "http://", 7)) host = url + 7;
     if (!host) return PAL_REFUSE(diag, "%s: not a ws:// or http:// address", url);
-    const size_t n_finest = strcspn(host, "/"), n_path = strlen(host + n_finest);
+    const size_t n_finest = strcspn(host, "/?#"), n_all = strcspn(host, "#");
+    const char *query = host + n_finest + (host[n_finest] == '/'), *ticket = host + n_all + (host[n_all] == '#');
+    if (!*ticket && getenv("PALPATE_TICKET")) ticket = getenv("PALPATE_TICKET");
+    /* the page's own address stands for the socket's */
+    const bool is_page = query == host + n_all || *query == '?';
+    const char *rest = is_page ? query : host + n_finest;
+    const size_t n_rest = (size_t)(host + n_all - rest), n_path = n_rest + (is_page ? strlen("/ws") : 0);
     const char *colon = NULL;
     const bool bracket = host[0] == '[';
     const char *close = bracket ? memchr(host, ']', n_finest) : NULL;
@@ -217,7 +224,10 @@ pal_err link_address_parse(const char *url, link_address *out, pal_diagnostic *d
     }
     memcpy(out->host, host + bracket, n_host);
     out->host[n_host] = 0;
-    memcpy(out->path, n_path > 1 ? host + n_finest : "/ws", n_path > 1 ? n_path + 1 : 4);
+    snprintf(out->path, sizeof out->path, "%s%.*s", is_page ? "/ws" : "", (int)n_rest, rest);
     out->port = (int)port;
+    if (strlen(ticket) >= sizeof out->ticket)
+        return PAL_REFUSE(diag, "the ticket of %.*s is too long", (int)n_all, host);
+    strcpy(out->ticket, ticket);
     return PAL_ERR_OK;
 }

@@ -2,6 +2,7 @@
 #include "server/base/clock.h"
 
 #include <netinet/tcp.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -21,7 +22,8 @@ struct pal_link {
     struct lws *wsi;
     link_address address;
     char name[PAL_WIRE_MEMBER_NAME];
-    pal_link_options o; /* without url and name, which are copied */
+    char protocols[128]; /* that it offers */
+    pal_link_options o;  /* without url and name, which are copied */
     bool closing, up, fixed, pause_reading;
     double read_budget;
     uint64_t read_ns;
@@ -82,7 +84,8 @@ static void link_free(pal_link *link)
 static bool link_may_return(int code)
 {
     return code == 0 || code == PAL_WIRE_CLOSE_NORMAL || code == PAL_WIRE_CLOSE_GOING_AWAY || code == 1005 ||
-           code == 1006 || code == PAL_WIRE_CLOSE_INTERNAL || code == PAL_WIRE_CLOSE_STALLED;
+           code == 1006 || code == PAL_WIRE_CLOSE_INTERNAL || code == PAL_WIRE_CLOSE_STALLED ||
+           code == PAL_WIRE_CLOSE_FULL;
 }
 
 /* the connection is gone: try again later, or end */
@@ -116,7 +119,7 @@ static void link_connect(pal_link *link)
     struct lws_client_connect_info info =
         link_connect_info(link->loop, &link->address, PAL_PROTOCOL_NAME, link, &link->wsi);
     info.path = link->address.path;
-    info.protocol = PAL_PROTOCOL_NAME;
+    info.protocol = link->protocols;
     info.ietf_version_or_minus_one = -1;
     /* on failure the callback has reported it */
     lws_client_connect_via_info(&info);
@@ -132,6 +135,8 @@ pal_err pal_link_open(pal_link_loop *loop, const pal_link_options *options, pal_
         return err;
     }
     link->loop = loop;
+    snprintf(link->protocols, sizeof link->protocols, link->address.ticket[0] ? "%s, %s%s" : "%s", PAL_PROTOCOL_NAME,
+             PAL_TICKET_PREFIX, link->address.ticket);
     strncpy(link->name, options->name ? options->name : "client", sizeof link->name - 1);
     link->o = *options;
     link->o.url = link->o.name = NULL;

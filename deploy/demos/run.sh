@@ -58,7 +58,7 @@ else
 fi
 cp "$here/$name.json" "$work/" || exit 1
 mkfifo "$work/serve" || exit 1
-"$bin/palpate" serve "$work/$name.json" --port 0 --json --quiet "$@" >"$work/serve" &
+"$bin/palpate" serve "$work/$name.json" --port 0 --open --json --quiet "$@" >"$work/serve" &
 server=$!
 pids=$server
 port=$(sed -n 's/.*"port":\([0-9]*\).*/\1/p;q' "$work/serve")

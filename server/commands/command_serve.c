@@ -29,6 +29,7 @@
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
@@ -159,6 +160,8 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
                                   .port = run->config.port,
                                   .allow_remote = run->config.allow_remote,
                                   .hosts = run->config.hosts,
+                                  .open = run->config.open,
+                                  .key_file = run->config.keys,
                                   .viewer_folder = viewer_folder(&run->config, folder, sizeof folder),
                                   .error_m = run->config.error_m,
                                   .max_clients = run->config.max_clients,
@@ -183,20 +186,35 @@ static void make_address(const serve_run *run, char *out, size_t cap)
 
 static int announce(const serve_run *run)
 {
-    char address[MAX_URL], url[MAX_URL + 16];
+    char address[MAX_URL], url[MAX_URL + 16], ticket[PAL_WIRE_ROLE_COUNT][PAL_TICKET_TEXT], own[MAX_URL + 128];
     make_address(run, address, sizeof address);
     snprintf(url, sizeof url, "http://%s/", address);
+    for (int r = 0; r < PAL_WIRE_ROLE_COUNT; r++) pal_server_start_ticket(run->server, (pal_wire_role)r, ticket[r]);
     if (run->common.json) {
-        cJSON *sessions = cJSON_CreateArray();
+        cJSON *sessions = cJSON_CreateArray(), *tickets = cJSON_CreateObject();
         for (int i = 0; i < run->n; i++) cJSON_AddItemToArray(sessions, JSON_TEXT(run->scene[i]->scene.name));
-        return pal_report_json(&run->common, PAL_JSON({"ok", JSON_BOOL(true)}, {"open", JSON_TEXT(url)},
-                                                      {"address", JSON_TEXT(run->config.listen)},
+        for (int r = 0; r < PAL_WIRE_ROLE_COUNT; r++)
+            cJSON_AddItemToObject(tickets, pal_wire_role_name((pal_wire_role)r), JSON_TEXT(ticket[r]));
+        snprintf(own, sizeof own, "%s%s%s", url, run->config.open ? "" : "#",
+                 run->config.open ? "" : ticket[PAL_WIRE_ROLE_INSTRUCTOR]);
+        return pal_report_json(&run->common, PAL_JSON({"ok", JSON_BOOL(true)}, {"open", JSON_TEXT(own)},
+                                                      {"tickets", tickets}, {"address", JSON_TEXT(run->config.listen)},
                                                       {"port", JSON_NUMBER(pal_server_port(run->server))},
                                                       {"pid", JSON_NUMBER(getpid())}, {"sessions", sessions}));
     }
-    if (!run->common.quiet) printf("palpate: open %s\n", url);
-    for (int i = 1; i < run->n && !run->common.quiet; i++)
-        printf("palpate: open %s?session=%s\n", url, run->scene[i]->scene.name);
+    if (run->common.quiet) return 0;
+    if (run->config.open) {
+        printf("palpate: open %s\n", url);
+        printf("palpate: whoever opens it may be instructor or trainee, take tools, edit and pause\n");
+    } else {
+        for (int r = PAL_WIRE_ROLE_COUNT - 1; r >= 0; r--)
+            printf(r == PAL_WIRE_ROLE_INSTRUCTOR ? "palpate: open %s#%s as %s\n" : "palpate: or   %s#%s as %s\n", url,
+                   ticket[r], pal_wire_role_name((pal_wire_role)r));
+        printf("palpate: whoever opens %s without the part behind # may only watch\n", url);
+    }
+    for (int i = 1; i < run->n; i++)
+        printf("palpate: with ?session=%s before the # for the session %s\n", run->scene[i]->scene.name,
+               run->scene[i]->scene.name);
     fflush(stdout);
     return 0;
 }
@@ -225,13 +243,16 @@ static void wait_until(uint64_t when_ns)
 /* one process for each session, with tools and channels of its own */
 static pal_err find_lcm(serve_run *run, pal_diagnostic *diag)
 {
-    char folder[PATH_MAX - 16], address[MAX_URL / 2];
+    char folder[PATH_MAX - 16], address[MAX_URL / 2], ticket[PAL_TICKET_TEXT];
     if (!run->config.lcm[0]) return PAL_ERR_OK;
     if (!program_folder(folder, sizeof folder))
         return pal_diagnostic_set(diag, PAL_ERR_IO, "/proc/self/exe cannot be read, so palpate-lcm is not found");
     snprintf(run->lcm_program, sizeof run->lcm_program, "%s/palpate-lcm", folder);
     if (access(run->lcm_program, X_OK)) return PAL_REFUSE(diag, "--lcm needs %s, which is not there", run->lcm_program);
     make_address(run, address, sizeof address);
+    /* the bus is trusted to move tools (clients/lcm_bridge) */
+    pal_server_start_ticket(run->server, PAL_WIRE_ROLE_TRAINEE, ticket);
+    if (setenv("PALPATE_TICKET", ticket, true)) return PAL_ERR_MEMORY;
     for (int i = 0; i < run->n; i++)
         snprintf(run->lcm[i].server, MAX_URL, "ws://%s/ws?session=%s", address, run->scene[i]->scene.name);
     return PAL_ERR_OK;

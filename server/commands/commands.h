@@ -11,6 +11,7 @@ typedef struct pal_command_entry {
 } pal_command_entry;
 
 int command_serve(int argc, char **argv);
+int command_ticket(int argc, char **argv);
 int command_prepare(int argc, char **argv);
 int command_cells(int argc, char **argv);
 int command_plan(int argc, char **argv);

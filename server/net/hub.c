@@ -2,11 +2,14 @@
  * (protocol/README.md, "Cycles and credit"). */
 #include "server/net/hub.h"
 
+#include "server/base/log.h"
 #include "server/net/http_pages.h"
 #include "server/net/hub_accuracy.h"
 #include "server/net/hub_fields.h"
 #include "server/net/hub_input.h"
 #include "server/net/hub_jobs.h"
+#include "server/net/hub_members.h"
+#include "server/net/hub_news.h"
 #include "server/net/hub_peers.h"
 #include "server/net/hub_plan.h"
 #include "server/net/hub_verb.h"
@@ -16,6 +19,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 /* ---- sending ---- */
 
@@ -29,25 +33,8 @@ static bool client_waiting(void *user, const pal_peer *peer)
     const pal_client *c = peer->client;
     (void)user;
     if (!c || peer->drop_code) return false;
-    return c->n_queue || c->members_due || c->status_due || c->haptic || c->out_begin < c->n_out ||
-           pal_hub_wants_estimate(c) || pal_hub_wants_field(c) || wants_cycle(c);
-}
-
-static pal_packet *members_message(const pal_hub_room *room)
-{
-    pal_hub *hub = room->hub;
-    pal_wire_members *m = &pal_hub_message(hub, PAL_CONTROL_MEMBERS)->members;
-    for (int i = 0; i < PAL_MEMBER_LIST_MAX; i++) {
-        const pal_member_entry *from = &room->members.member[i];
-        if (!from->id) continue;
-        pal_wire_member *to = &m->member[m->n_member++];
-        to->id = (uint16_t)from->id;
-        to->role = (pal_wire_role)from->role;
-        to->tool = from->tool >= 0 ? from->tool : PAL_WIRE_TOOL_NONE;
-        to->colour = pal_hub_colour(from->id);
-        pal_plain_text(to->name, sizeof to->name, from->name);
-    }
-    return pal_hub_encode(hub);
+    return c->n_queue || c->members_due || c->reported_order < c->room->reported_order || c->status_due || c->haptic ||
+           c->out_begin < c->n_out || pal_hub_wants_estimate(c) || pal_hub_wants_field(c) || wants_cycle(c);
 }
 
 /* NULL: a replaced session has no frame yet, and its simulated time continues with the first */
@@ -140,8 +127,9 @@ static pal_packet *take_next(pal_client *c)
     }
     if (c->members_due) {
         c->members_due = false;
-        if ((p = members_message(c->room))) return p;
+        if (c->room->members_message) return pal_packet_hold(c->room->members_message);
     }
+    if ((p = pal_hub_next_orders(c))) return p;
     if (c->status_due) {
         c->status_due = false;
         if ((p = status_message(c))) return p;
@@ -182,26 +170,63 @@ static pal_hub_room *find_room(pal_hub *hub, const char *session)
     return NULL;
 }
 
-static void client_opened(void *user, pal_peer *peer, const char *session)
+/* the client has no place any more; its peer closes by itself */
+static void let_go(pal_client *c)
+{
+    pal_hub_leave_room(c);
+    c->peer->client = NULL;
+    c->peer = NULL;
+    c->hub->n_client--;
+}
+
+/* a place for a peer that has not joined. Beyond a number of them, the oldest one loses its place, of the same address
+ * first, so that who opens connections and says nothing keeps nobody out */
+static pal_client *take_place(pal_hub *hub, const char *address)
+{
+    pal_client *place = NULL, *oldest = NULL, *oldest_here = NULL;
+    int n = 0, n_here = 0;
+    for (pal_client *c = hub->client; c < hub->client + hub->max_clients; c++) {
+        if (!c->peer) place = place ? place : c;
+        if (!c->peer || c->id) continue;
+        const bool here = !strcmp(c->peer->address, address);
+        n++, n_here += here;
+        if (!oldest || c->opened_ns < oldest->opened_ns) oldest = c;
+        if (here && (!oldest_here || c->opened_ns < oldest_here->opened_ns)) oldest_here = c;
+    }
+    if (n_here < PAL_UNJOINED_OF_ADDRESS) oldest_here = NULL;
+    pal_client *evicted = oldest_here ? oldest_here : n < PAL_UNJOINED_PLACES ? NULL : oldest;
+    if (!evicted) return place;
+    hub->count.n_refused_join++;
+    pal_hub_drop(evicted, PAL_WIRE_CLOSE_FULL, "too many connections that do not join");
+    let_go(evicted);
+    return evicted;
+}
+
+static void client_opened(void *user, pal_peer *peer, const char *session, const char *ticket)
 {
     pal_hub *hub = user;
     pal_hub_room *room = find_room(hub, session);
-    int i = 0;
-    while (i < hub->max_clients && hub->client[i].peer) i++;
+    const uint64_t now = pal_loop_now_ns(hub->loop);
+    pal_grant grant;
+    const char *why = NULL;
     if (hub->leaving)
         pal_peer_drop(peer, PAL_WIRE_CLOSE_GOING_AWAY, "the server ends");
     else if (!room)
         pal_peer_drop(peer, PAL_WIRE_CLOSE_NO_SESSION, "there is no session of that name");
-    else if (i == hub->max_clients)
-        pal_peer_drop(peer, PAL_WIRE_CLOSE_FULL, "the server has its %d clients", hub->max_clients);
+    else if ((why = pal_admission_check(hub->admission, ticket, pal_session_scene(room->session)->name, peer->address,
+                                        (uint64_t)time(NULL), now, &grant)))
+        pal_peer_drop(peer, PAL_WIRE_CLOSE_POLICY, "%s", why);
+    pal_client *c = peer->drop_code ? NULL : take_place(hub, peer->address);
+    if (!c && !peer->drop_code) pal_peer_drop(peer, PAL_WIRE_CLOSE_FULL, "the server has no free place");
     if (peer->drop_code) {
         hub->count.n_refused_join++;
+        pal_log(PAL_LOG_INFO, "refused", "a client from %s: %s", peer->address[0] ? peer->address : "this process",
+                peer->drop_reason);
         return;
     }
-    pal_client *c = &hub->client[i];
-    uint64_t now = pal_loop_now_ns(hub->loop);
-    *c = (pal_client){.hub = hub, .peer = peer, .room = room, .opened_ns = now};
-    pal_bucket_begin(&c->bucket, PAL_MESSAGES_1_S, PAL_MESSAGES_1_S / 2, now);
+    *c = (pal_client){.hub = hub, .peer = peer, .room = room, .opened_ns = now, .grant = grant};
+    pal_bucket_begin(&c->poses, PAL_MESSAGES_1_S, PAL_MESSAGES_1_S / 2, now);
+    pal_bucket_begin(&c->orders, PAL_CONTROL_1_S, PAL_CONTROL_AT_ONCE, now);
     pal_credit_begin(&c->credit, pal_stream_rate_hz(room->stream));
     peer->client = c;
     hub->n_client++;
@@ -211,11 +236,7 @@ static void client_closed(void *user, pal_peer *peer)
 {
     pal_client *c = peer->client;
     (void)user;
-    if (!c) return;
-    pal_hub_leave_room(c);
-    peer->client = NULL;
-    c->peer = NULL;
-    c->hub->n_client--;
+    if (c) let_go(c);
 }
 
 /* ---- frames and housekeeping ---- */
@@ -245,6 +266,8 @@ static void hub_wake(void *user)
             if (pal_stream_update(room->stream, now, used, room->tool)) offer_cycle(room);
         }
         next = pal_hub_make_fields(room, now);
+        if (next && (!due || next < due)) due = next;
+        next = pal_hub_report_news(room, now);
         if (next && (!due || next < due)) due = next;
     }
     pal_hub_jobs_update(hub);
@@ -324,12 +347,14 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
     hub->error_m = options->error_m;
     hub->verb = options->verb ? options->verb : pal_verb_table;
     hub->n_verb = options->verb ? options->n_verb : pal_verb_count;
-    hub->max_clients = options->max_clients > 0 ? options->max_clients : PAL_HUB_CLIENTS;
+    hub->max_members = options->max_clients > 0 ? options->max_clients : PAL_HUB_CLIENTS;
+    hub->max_clients = hub->max_members + PAL_UNJOINED_PLACES;
     hub->room = calloc((size_t)n_session, sizeof *hub->room);
     hub->client = calloc((size_t)hub->max_clients, sizeof *hub->client);
     hub->control = malloc(sizeof *hub->control);
     hub->text = malloc(PAL_CONTROL_OUT_MAX + 1);
     if (!hub->room || !hub->client || !hub->control || !hub->text) err = PAL_ERR_MEMORY;
+    if (!err) err = pal_admission_create(options->key_file, options->open, diag, &hub->admission);
     for (int i = 0; !err && i < n_session; i++) {
         pal_hub_room *room = &hub->room[i];
         const pal_scene *scene = pal_session_scene(session[i]);
@@ -337,6 +362,7 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
         room->session = session[i];
         room->step_s = scene->step_s;
         pal_members_init(&room->members, scene->n_tool);
+        if (options->open) room->members.rights = pal_rights_named("") & ~(1u << PAL_RIGHT_COMPONENT);
         for (int b = 0; b < scene->n_body; b++) room->material[b] = scene->body[b].material;
         if (options->study && options->study[i].n > 0) room->study = options->study[i];
         err = pal_stream_open(session[i], options->error_m, diag, &room->stream);
@@ -356,6 +382,7 @@ void pal_hub_destroy(pal_hub *hub)
         pal_hub_room *room = &hub->room[i];
         pal_stream_close(room->stream);
         if (room->own) pal_session_close(room->session);
+        pal_packet_drop(room->members_message);
         for (int k = 0; k < PAL_HUB_OLD_ASSETS; k++) pal_packet_drop(room->past[k].asset);
         for (int b = 0; b < PAL_BODY_MAX; b++) {
             pal_sculptor_destroy(room->edits[b].sculptor);
@@ -364,6 +391,7 @@ void pal_hub_destroy(pal_hub *hub)
             free(room->edits[b].base);
         }
     }
+    pal_admission_destroy(hub->admission);
     free(hub->room);
     free(hub->client);
     free(hub->control);
@@ -387,6 +415,11 @@ void pal_hub_goodbye(pal_hub *hub)
     hub->leaving = true;
     for (int i = 0; i < hub->max_clients; i++)
         if (hub->client[i].peer) pal_hub_drop(&hub->client[i], PAL_WIRE_CLOSE_GOING_AWAY, "the server ends");
+}
+
+void pal_hub_start_ticket(const pal_hub *hub, pal_wire_role role, char text[PAL_TICKET_TEXT])
+{
+    pal_admission_start_ticket(hub->admission, role, text);
 }
 
 int pal_hub_clients(const pal_hub *hub)

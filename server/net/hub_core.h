@@ -1,6 +1,7 @@
 /* Structs of the hub: clients, rooms, counters. Shared by all files of the hub. Thread: [net]. */
 #ifndef PAL_NET_HUB_CORE_H
 #define PAL_NET_HUB_CORE_H
+#include "server/net/admission.h"
 #include "server/net/stream.h"
 #include "server/net/transport/credit.h"
 #include "server/net/transport/site.h"
@@ -26,14 +27,16 @@ typedef struct pal_client {
     struct pal_hub_room *room;
     int id; /* member id; 0: not joined */
     uint64_t opened_ns;
-    pal_bucket bucket;
+    pal_grant grant;
+    pal_bucket poses, orders; /* what it may send: poses and acknowledgements; control messages */
     pal_credit credit;
     int tier;
     /* control messages: a queue, oldest first, and flags for messages encoded on demand */
     pal_packet *queue[PAL_HUB_QUEUE];
     int n_queue;
     bool members_due, status_due;
-    pal_packet *haptic; /* newest contact model, unsent */
+    uint64_t reported_order; /* orders of the room that it has been told */
+    pal_packet *haptic;      /* newest contact model, unsent */
     /* cycle in transmission: per part a TOPOLOGY_DELTA if its triangles changed, and a FRAME; then TOOLS */
     pal_packet *out[2 * PAL_BODY_MAX + 1];
     int n_out, out_begin;
@@ -75,6 +78,12 @@ typedef struct pal_hub_tool_brush {
     pal_brush brush;   /* kind NONE: none     */
 } pal_hub_tool_brush;
 
+/* a command that was carried out */
+typedef struct pal_hub_order {
+    pal_wire_order order; /* age_s: unused */
+    uint64_t at_ns;
+} pal_hub_order;
+
 /* one session, as the hub sees it */
 typedef struct pal_hub_room {
     pal_hub *hub;
@@ -86,6 +95,11 @@ typedef struct pal_hub_room {
     pal_hub_body_edits edits[PAL_BODY_MAX];
     pal_hub_tool_brush brush[PAL_TOOL_MAX];
     pal_member_list members;
+    bool members_changed;
+    pal_packet *members_message;             /* encoded once for all; NULL: none yet */
+    uint64_t news_ns;                        /* when members or orders were told last */
+    pal_hub_order order[PAL_WIRE_ORDER_MAX]; /* ring buffer */
+    uint64_t n_order, reported_order;
     pal_stream_tool tool[PAL_TOOL_MAX];
     double moved_m[PAL_TOOL_MAX][3]; /* where each tool was, and its buttons, when it last moved, at moved_ns */
     uint32_t moved_buttons[PAL_TOOL_MAX];
@@ -121,7 +135,8 @@ struct pal_hub {
     int n_verb;
     double error_m;
     pal_site *site;
-    int n_room, max_clients, n_client;
+    pal_admission *admission;
+    int n_room, max_members, max_clients, n_client; /* max_clients: members and those who have not joined yet */
     bool leaving;
     pal_hub_room *room;   /* [n_room] */
     pal_client *client;   /* [max_clients] */

@@ -6,6 +6,4 @@
 
 /* handles one whole, untrusted message; hub: a pal_hub (a pal_peer_events.received) */
 void pal_hub_received(void *hub, pal_peer *peer, const uint8_t *bytes, size_t n_byte, bool text);
-/* gives a tool that has not been moved for PAL_IDLE_NS to the member of its room that has waited longest for one */
-void pal_hub_hand_over_idle_tools(pal_hub *hub);
 #endif

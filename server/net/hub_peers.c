@@ -84,6 +84,7 @@ void pal_hub_leave_room(pal_client *c)
     if (tool >= 0) pal_hub_release_tool(room, tool);
     room->tier_users[c->tier]--;
     pal_session_observe(room->session, false);
+    pal_admission_leave(c->hub->admission, &c->grant, pal_loop_now_ns(c->hub->loop));
     c->id = 0;
     pal_hub_members_changed(room);
 }
@@ -159,10 +160,8 @@ pal_client *pal_hub_next_member(const pal_hub_room *room, pal_client *after)
     return NULL;
 }
 
-void pal_hub_members_changed(const pal_hub_room *room)
+void pal_hub_members_changed(pal_hub_room *room)
 {
-    for (pal_client *c = NULL; (c = pal_hub_next_member(room, c));) {
-        c->members_due = true;
-        c->peer->ops->ready(c->peer);
-    }
+    room->members_changed = true;
+    pal_loop_wake(room->hub->loop);
 }

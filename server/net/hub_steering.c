@@ -1,6 +1,7 @@
 /* Verbs that control a session. */
 #include "server/net/hub_verb.h"
 
+#include "server/net/hub_news.h"
 #include "server/net/hub_peers.h"
 
 bool pal_hub_run_steering(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
@@ -16,12 +17,14 @@ bool pal_hub_run_reset(pal_client *c, const pal_verb *verb, const pal_wire_comma
     bool whole = !command->target[0];
     int body = pal_hub_find_body(c, command->target, 0);
     if (body < 0) return false;
-    if (pal_members_find(&c->room->members, c->id)->role == PAL_MEMBER_VIEWER &&
-        (whole || !f || body >= f->n_part || !f->part[body].frozen))
-        return pal_hub_refuse(c, "role", "reset: a viewer resets nothing but a frozen body");
-    return pal_hub_session_command(
-        c, verb->name,
-        &(pal_command){.kind = whole ? PAL_COMMAND_RESET : PAL_COMMAND_RESET_BODY, .body = whole ? 0 : body});
+    if (!pal_hub_may(c, PAL_RIGHT_STEER) && (whole || !f || body >= f->n_part || !f->part[body].frozen))
+        return pal_hub_refuse(c, "role", "reset: only for %s, but for a frozen body", pal_right_text[PAL_RIGHT_STEER]);
+    if (!pal_hub_session_command(
+            c, verb->name,
+            &(pal_command){.kind = whole ? PAL_COMMAND_RESET : PAL_COMMAND_RESET_BODY, .body = whole ? 0 : body}))
+        return false;
+    pal_hub_note_order(c, command);
+    return true;
 }
 
 bool pal_hub_run_material(pal_client *c, const pal_verb *verb, const pal_wire_command *command)

@@ -1,6 +1,7 @@
 /* Finds, checks and executes verbs. */
 #include "server/net/hub_verb.h"
 
+#include "server/net/hub_news.h"
 #include "server/net/hub_peers.h"
 #include "server/net/transport/plain_text.h"
 
@@ -45,12 +46,10 @@ static bool check_args(pal_client *c, const pal_verb *verb, const pal_wire_comma
 
 static bool check_right(pal_client *c, const pal_verb *verb)
 {
-    const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
-    bool instructs = m->role == PAL_MEMBER_INSTRUCTOR;
-    bool may = verb->right == PAL_RIGHT_EVERYBODY || instructs ||
-               (verb->right == PAL_RIGHT_TRAINEE && m->role != PAL_MEMBER_VIEWER) ||
-               (verb->right == PAL_RIGHT_TOOL && m->tool >= 0);
-    return may || pal_hub_refuse(c, "role", "%s: only for %s", verb->name, pal_right_text[verb->right]);
+    if (pal_members_find(&c->room->members, c->id)->muted)
+        return pal_hub_refuse(c, "muted", "%s: an instructor lets you watch only", verb->name);
+    return pal_hub_may(c, verb->right) ||
+           pal_hub_refuse(c, "role", "%s: only for %s", verb->name, pal_right_text[verb->right]);
 }
 
 bool pal_hub_execute(pal_client *c, const pal_wire_command *command)
@@ -58,7 +57,9 @@ bool pal_hub_execute(pal_client *c, const pal_wire_command *command)
     const pal_verb *verb = c->hub->verb, *end = verb + c->hub->n_verb;
     while (verb < end && strcmp(verb->name, command->verb)) verb++;
     if (verb == end) return pal_hub_refuse(c, "verb", "there is no command %s", command->verb);
-    return check_right(c, verb) && check_args(c, verb, command) && verb->run(c, verb, command);
+    if (!check_right(c, verb) || !check_args(c, verb, command) || !verb->run(c, verb, command)) return false;
+    if (verb->right >= PAL_RIGHT_STEER) pal_hub_note_order(c, command);
+    return true;
 }
 
 int pal_hub_find_body(pal_client *c, const char *name, int otherwise)

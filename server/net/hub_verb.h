@@ -3,10 +3,7 @@
 #ifndef PAL_NET_HUB_VERB_H
 #define PAL_NET_HUB_VERB_H
 #include "server/mesh/cells/cell_edits.h"
-#include "server/net/hub_core.h"
-
-/* who may give a command */
-typedef enum pal_right { PAL_RIGHT_EVERYBODY, PAL_RIGHT_TRAINEE, PAL_RIGHT_TOOL, PAL_RIGHT_INSTRUCTOR } pal_right;
+#include "server/net/hub_rights.h"
 
 /* called after permission and keys are checked; sends an answer or an error. false: an error */
 typedef bool pal_verb_run(pal_client *client, const pal_verb *verb, const pal_wire_command *command);
@@ -25,9 +22,11 @@ extern const int pal_verb_count;
 /* formats a table as text, one line per verb with tab-separated name, permission, arguments and description; returns
  * the number of bytes of the whole text, as snprintf does. Thread: any */
 int pal_verb_describe(const pal_verb *verb, int n_verb, char *text, size_t cap);
-extern const char *const pal_right_text[]; /* the same in words, by pal_right */
 
-/* functions of the table, in hub_steering.c, hub_plan.c, hub_accuracy.c, hub_switch.c and hub_sculpt.c */
+/* functions of the table, in hub_steering.c, hub_instruct.c, hub_plan.c, hub_accuracy.c, hub_switch.c and hub_sculpt.c
+ */
+pal_verb_run pal_hub_run_allow, pal_hub_run_hand_over, pal_hub_run_lock, pal_hub_run_mute, pal_hub_run_remove;
+enum { PAL_LOCK_TOOL, PAL_LOCK_SESSION, PAL_REMOVE, PAL_REMOVE_AND_BAN }; /* details of lock and remove */
 pal_verb_run pal_hub_run_steering, pal_hub_run_reset, pal_hub_run_material, pal_hub_run_component, pal_hub_run_estimate,
     pal_hub_run_switch, pal_hub_run_edit, pal_hub_run_probe, pal_hub_run_brush;
 /* detail of a brush is a pal_brush_kind, of an edit a pal_cells_command_kind or one of these */

@@ -71,8 +71,8 @@ static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_
     pal_peer_events events;
     PAL_TRY(choose_address(options, &s->address, diag));
     if (options->viewer_folder) PAL_TRY(pal_site_open(options->viewer_folder, diag, &s->site));
-    /* besides the clients: page loads, and what lws needs itself */
-    int max_socket = (options->max_clients > 0 ? options->max_clients : PAL_HUB_CLIENTS) + 128;
+    /* besides the members: connections that do not join, page loads, and what lws needs itself */
+    int max_socket = (options->max_clients > 0 ? options->max_clients : PAL_HUB_CLIENTS) + PAL_UNJOINED_PLACES + 128;
     PAL_TRY(pal_loop_create(s->ops->sockets, max_socket, pal_session_clock(session[0]), diag, &s->loop));
     PAL_TRY(pal_hub_create(s->loop, options, s->site, session, n_session, diag, &s->hub));
     pal_hub_events(s->hub, &events);
@@ -106,6 +106,11 @@ pal_err pal_server_run(pal_server *server)
 void pal_server_stop(pal_server *server)
 {
     pal_loop_stop(server->loop);
+}
+
+void pal_server_start_ticket(const pal_server *server, pal_wire_role role, char text[PAL_TICKET_TEXT])
+{
+    pal_hub_start_ticket(server->hub, role, text);
 }
 
 int pal_server_port(const pal_server *server)

@@ -25,6 +25,8 @@ void pal_server_connect(pal_server *server, pal_server_gate *gate); /* [load] */
 
 pal_err pal_server_run(pal_server *server); /* returns after pal_server_stop; this thread is [net] */
 void pal_server_stop(pal_server *server);   /* [any], also from a signal-handling thread */
+/* a ticket of this server for any session and tool, as long as it runs */
+void pal_server_start_ticket(const pal_server *server, pal_wire_role role, char text[PAL_TICKET_TEXT]);
 int pal_server_port(const pal_server *server);
 void pal_server_close(pal_server *server); /* [load] */
 

@@ -20,9 +20,26 @@
     {                                                                                                                  \
         1, 2, 5                                                                                                        \
     }
-/* 1/s: messages of a client (protocol/README.md, "Limits"); as many as in half a second at once, so that a delay of the
- * server closes no client (test_ws) */
+/* 1/s: poses and acknowledgements of a client (protocol/README.md, "Limits"); as many as in half a second at once, so
+ * that a delay of the server closes no client (test_ws) */
 #define PAL_MESSAGES_1_S 600
+/* 1/s: control messages of a client, far more than hands give on a page, and as many at once as a page sends when it
+ * loads (test_hub) */
+#define PAL_CONTROL_1_S     20
+#define PAL_CONTROL_AT_ONCE 40
+/* ns: a member whose connection has ended may return with its ticket for so long: a station restarts (test_admission)
+ */
+#define PAL_RETURN_NS 60000000000u
+/* places that only instructors may take, but at most a quarter of all (test_hub) */
+#define PAL_INSTRUCTOR_PLACES 4
+/* members from one address of another machine without a ticket made for them (test_hub) */
+#define PAL_ADDRESS_PLACES 32
+/* connections that have not joined yet, in all and from one address; a further one takes the place of the oldest. A
+ * client joins within a round trip or two (test_hub) */
+#define PAL_UNJOINED_PLACES     64
+#define PAL_UNJOINED_OF_ADDRESS 16
+/* ns between two `members` messages of a session: an onlooker reads no more often (test_hub) */
+#define PAL_MEMBERS_NS 250000000u
 /* ns between two errors about poses to one client: a pose comes 250 times a second (test_hub) */
 #define PAL_POSE_ERROR_NS 1000000000u
 /* ns without a motion of PAL_STILL_M, m, after which a tool goes to who waits for one: longer than a trainee looks or

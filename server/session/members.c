@@ -93,14 +93,16 @@ static int take_id(pal_member_list *members)
 pal_err pal_members_join(pal_member_list *members, pal_member_role role, const char *name, int *id)
 {
     pal_member_entry *entry = NULL;
+    const int kept = role == PAL_MEMBER_INSTRUCTOR ? 0 : PAL_MEMBER_INSTRUCTORS;
+    if (members->locked && role != PAL_MEMBER_INSTRUCTOR) return PAL_ERR_STATE;
     for (int k = 0; k < PAL_MEMBER_LIST_MAX && !entry; k++)
         if (!members->member[k].id) entry = &members->member[k];
-    if (!entry) return PAL_ERR_FULL;
+    if (!entry || members->n_member >= PAL_MEMBER_LIST_MAX - kept) return PAL_ERR_FULL;
     char plain[PAL_MEMBER_NAME], full[PAL_MEMBER_NAME + 12];
     clean_name(name, plain);
     snprintf(full, sizeof full, "%s", plain);
     for (int number = 2; name_taken(members, full); number++) snprintf(full, sizeof full, "%s %d", plain, number);
-    *entry = (pal_member_entry){.id = take_id(members), .role = role, .tool = -1};
+    *entry = (pal_member_entry){.id = take_id(members), .role = role, .tool = -1, .rights = members->rights};
     snprintf(entry->name, sizeof entry->name, "%.*s", PAL_MEMBER_NAME - 1, full);
     members->n_member++;
     *id = entry->id;
@@ -134,12 +136,16 @@ void pal_members_leave(pal_member_list *members, int id)
 pal_err pal_members_take_tool(pal_member_list *members, int id, int tool, int *taken)
 {
     pal_member_entry *member = pal_members_find(members, id);
-    if (!member || member->role == PAL_MEMBER_VIEWER || tool < -1 || tool >= members->n_tool) return PAL_ERR_REFUSED;
+    if (!member || member->role == PAL_MEMBER_VIEWER || member->muted || tool < -1 || tool >= members->n_tool)
+        return PAL_ERR_REFUSED;
+    const bool instructs = member->role == PAL_MEMBER_INSTRUCTOR;
     /* any: the tool already held, else the first free one */
     if (tool == -1) tool = member->tool;
     for (int k = 0; k < members->n_tool && tool == -1; k++)
-        if (!members->holder[k]) tool = k;
-    if (tool == -1 || (members->holder[tool] && members->holder[tool] != id)) return PAL_ERR_STATE;
+        if (!members->holder[k] && (instructs || !members->tool_locked[k])) tool = k;
+    if (tool == -1 || (members->holder[tool] && members->holder[tool] != id) ||
+        (members->tool_locked[tool] && !instructs))
+        return PAL_ERR_STATE;
     pal_members_release_tool(members, id);
     members->holder[tool] = id;
     member->tool = tool;

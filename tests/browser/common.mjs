@@ -77,10 +77,10 @@ export function prepare() {
     return join(folder, "scene.json");
 }
 
-/** starts a server; info: its first JSON line */
-export function serve(scene, port, more = []) {
+/** starts a server, to which everybody may come unless `admission` says otherwise; info: its first JSON line */
+export function serve(scene, port, more = [], admission = ["--open"]) {
     const child = endWithTest(
-        spawn(palpate, ["serve", scene, "--port", String(port), "--json", ...more], {
+        spawn(palpate, ["serve", scene, "--port", String(port), "--json", ...admission, ...more], {
             stdio: ["ignore", "pipe", "inherit"],
         }),
     );
@@ -122,7 +122,8 @@ export async function open(browser, address, name, viewport) {
     page.setDefaultTimeout(300000);
     page.on("console", (m) => m.type() === "error" && consoleErrors.push(`${name}: ${m.text()}`));
     page.on("pageerror", (e) => consoleErrors.push(`${name}: ${e.message}`));
-    await page.goto(`${address}?name=${name}`);
+    const [place, ticket] = address.split("#");
+    await page.goto(`${place}?name=${name}${ticket ? "#" + ticket : ""}`);
     await page.waitForFunction(() => window.palpate?.state.bodies.size > 0 && window.palpate.state.status);
     return page;
 }

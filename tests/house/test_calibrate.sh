@@ -136,7 +136,7 @@ end
 client=$(dirname "$palpate")/palpate-client
 if [ -x "$client" ]; then
     "$palpate" prepare --procedural --resolution 10 -o organ >out 2>err
-    "$palpate" serve organ/scene.json --record pull.log --port 0 --seconds 20 >served 2>&1 &
+    "$palpate" serve organ/scene.json --open --record pull.log --port 0 --seconds 20 >served 2>&1 &
     server=$!
     begin "the touches of a recording become load cases, a release the damping"
     check "the server does not say where it is" shows served "$server" 'open http'

@@ -208,7 +208,7 @@ refused 2 'no command "dance"'
 end
 
 begin "what serve records replays to the same hashes, and not against another scene"
-"$palpate" serve scene --port 0 --record rec.bin >serve.out 2>serve.err &
+"$palpate" serve scene --port 0 --open --record rec.bin >serve.out 2>serve.err &
 server=$!
 check "serve did not start" shows serve.out "$server" "http://"
 check "nothing is recorded" grows rec.bin "$server" 1000
@@ -225,7 +225,7 @@ refused 1 "recorded from another scene"
 end
 
 begin "a recording survives kill -9, is not written over, and a closed terminal ends it in order"
-"$palpate" serve scene --port 0 --record rec.bin >serve.out 2>serve.err &
+"$palpate" serve scene --port 0 --open --record rec.bin >serve.out 2>serve.err &
 server=$!
 check "serve did not start" shows serve.out "$server" "http://"
 check "the file that is there was taken" has serve.err "rec.2.bin: records"
@@ -240,7 +240,7 @@ run replay rec.2.bin scene --strict
 refused 1 "the log is cut"
 run replay rec.bin scene --strict --quiet
 check "replay of the first: exit code $code" code_is 0
-"$palpate" serve scene --port 0 --record rec.bin >serve.out 2>serve.err &
+"$palpate" serve scene --port 0 --open --record rec.bin >serve.out 2>serve.err &
 server=$!
 check "serve did not start" shows serve.out "$server" "http://"
 check "nothing is recorded" grows rec.3.bin "$server" 100

@@ -240,7 +240,7 @@ check "plan does not say which" has out "picked of the .* configurations of near
 run plan near --json
 check "no configuration in JSON" has out '"picked":{"body":'
 : >out # or what plan said is taken for the server's words
-timeout 60 "$palpate" serve near --port 0 --json >out 2>err </dev/null &
+timeout 60 "$palpate" serve near --port 0 --open --json >out 2>err </dev/null &
 child=$!
 check "serve did not start" shows out "$child" '"port":'
 kill "$child"

@@ -43,7 +43,7 @@ const terms = {
 };
 // the files of the session, the wire and the clients in which a tool has a holder: the member who moves it
 const member_with_tool =
-    /^(protocol\/wire|server\/(session\/(members|session)|net\/(stream|hub_(input|peers|jobs|verb)|http_pages))\.|clients\/(viewer|scripted_client)\/|tests\/(protocol|session|net|browser)\/)/;
+    /^(protocol\/wire|server\/(session\/(members|session)|net\/(stream|hub_(input|members|instruct|peers|jobs|verb)|http_pages))\.|clients\/(viewer|scripted_client)\/|tests\/(protocol|session|net|browser)\/)/;
 // uses that are right: the identifier, or the file, matches
 const right = {
     trainee: /^(.*role.*|PAL_(MEMBER|RIGHT)_TRAINEE|trainee)$/i, // a role of a member

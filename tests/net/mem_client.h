@@ -45,18 +45,29 @@ static inline void mem_text(mem_client *c, const char *text)
     pal_mem_send(c->peer, text, strlen(text), true);
 }
 
-static inline void mem_join_as(mem_client *c, pal_transport *transport, const char *name, pal_wire_role role, int tool,
-                               bool patches)
+static inline void mem_connect(mem_client *c, pal_transport *transport, const char *address, const char *ticket)
 {
-    pal_control join = {.type = PAL_CONTROL_JOIN};
     memset(c, 0, sizeof *c);
     c->transport = transport;
-    c->peer = pal_mem_connect(transport, "");
+    c->peer = pal_mem_connect_from(transport, "", address, ticket);
+}
+
+/* of a client that is connected */
+static inline void mem_enter(mem_client *c, const char *name, pal_wire_role role, int tool, bool patches)
+{
+    pal_control join = {.type = PAL_CONTROL_JOIN};
     join.join.role = role;
     join.join.tool = tool;
     join.join.topology_deltas = patches;
     snprintf(join.join.name, sizeof join.join.name, "%s", name);
     mem_send(c, &join);
+}
+
+static inline void mem_join_as(mem_client *c, pal_transport *transport, const char *name, pal_wire_role role, int tool,
+                               bool patches)
+{
+    mem_connect(c, transport, "", "");
+    mem_enter(c, name, role, tool, patches);
 }
 
 static inline void mem_join(mem_client *c, pal_transport *transport, const char *name, pal_wire_role role, int tool)

@@ -5,7 +5,9 @@
 #include "protocol/control.h"
 #include "server/net/transport/transport.h"
 
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 typedef struct pal_mem_peer pal_mem_peer;
 struct pal_mem_peer {
@@ -58,7 +60,8 @@ static const pal_transport_ops pal_mem_transport = {false, mem_open, mem_ignore,
 
 /* calls opened before it returns; session "": the first. NULL: out of memory. pal_mem_leave or closing the transport
  * frees the peer. */
-static inline pal_mem_peer *pal_mem_connect(pal_transport *transport, const char *session)
+static inline pal_mem_peer *pal_mem_connect_from(pal_transport *transport, const char *session, const char *address,
+                                                 const char *ticket)
 {
     pal_mem_peer *p = calloc(1, sizeof *p);
     if (!p) return NULL;
@@ -66,8 +69,14 @@ static inline pal_mem_peer *pal_mem_connect(pal_transport *transport, const char
     p->transport = transport;
     p->next = transport->first;
     transport->first = p;
-    transport->events.opened(transport->events.user, &p->peer, session);
+    snprintf(p->peer.address, sizeof p->peer.address, "%s", address);
+    transport->events.opened(transport->events.user, &p->peer, session, ticket);
     return p;
+}
+
+static inline pal_mem_peer *pal_mem_connect(pal_transport *transport, const char *session)
+{
+    return pal_mem_connect_from(transport, session, "", "");
 }
 
 static inline void pal_mem_leave(pal_mem_peer *peer)

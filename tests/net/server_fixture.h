@@ -12,6 +12,7 @@ static pal_session *session;
 static pal_server *server;
 static pal_server_gate gate;
 static pal_transport *transport;
+static bool served_guarded; /* without a ticket a client is a viewer; else it is what it asks to be */
 static manual_clock served_clock;
 static uint64_t served_step_ns; /* of the scene as opened */
 
@@ -31,6 +32,7 @@ static inline void served_open(pal_server_options net)
 {
     pal_diagnostic diag = {""};
     net.transport = &pal_mem_transport;
+    net.open = !served_guarded;
     if (pal_server_open(&net, &session, 1, &diag, &server)) CHECK_FAIL("no server: %s", diag.text);
     pal_server_connect(server, &gate);
     transport = pal_server_transport(server);

@@ -123,8 +123,9 @@ static void others_do_not_and_bad_orders_are_refused(void)
         COMPONENT("tet_volume", 0), "{\"type\":\"command\",\"verb\":\"component\",\"target\":\"tet_volume\"}",
         "{\"type\":\"command\",\"verb\":\"component\",\"target\":\"a\",\"args\":{\"part\":1,\"enabled\":0}}",
         "{\"type\":\"command\",\"verb\":\"reset\",\"target\":\"liver\"}"};
-    static const char *const summary[] = {"component: only for instructors", "component: part is missing",
-                                          "component: part 1, wanted 0 to 0", "there is no body liver"};
+    static const char *const summary[] = {"component: only for instructors, and trainees with the right component",
+                                          "component: part is missing", "component: part 1, wanted 0 to 0",
+                                          "there is no body liver"};
     static mem_client ada, bo;
     begin(false);
     mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
@@ -156,7 +157,8 @@ static void everybody_resets_what_was_stopped_and_a_viewer_nothing_else(void)
     CHECK_INT(cy.n_text[PAL_CONTROL_ERROR], 0);
     mem_text(&cy, "{\"type\":\"command\",\"verb\":\"reset\",\"target\":\"organ\"}");
     UNTIL(cy.n_text[PAL_CONTROL_ERROR] == 1, &cy, NULL);
-    CHECK_TEXT(cy.last[PAL_CONTROL_ERROR].error.text, "reset: a viewer resets nothing but a frozen body");
+    CHECK_TEXT(cy.last[PAL_CONTROL_ERROR].error.text,
+               "reset: only for instructors, and trainees with the right steer, but for a frozen body");
     mem_end(&cy);
     end();
 }

@@ -249,22 +249,25 @@ static void hands_blow_up_and_pull_until_they_let_go(void)
     end();
 }
 
-static void who_holds_no_tool_and_teaches_nobody_sculpts_nothing(void)
+static void who_has_no_right_sculpts_nothing(void)
 {
-    mem_client looks, bare, holds;
+    mem_client looks, bare, teaches;
     begin();
     join(&looks, "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     join(&bare, "Bob", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
-    join(&holds, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    join(&teaches, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    mem_text(&teaches, "{\"type\":\"command\",\"verb\":\"allow\",\"target\":\"sculpt\",\"args\":{\"enabled\":0}}");
     CHECK(!order(&looks, "divide", TOP));
     CHECK_TEXT(looks.last[PAL_CONTROL_ERROR].error.code, "role");
     CHECK(!order(&bare, "divide", TOP));
     CHECK_TEXT(bare.last[PAL_CONTROL_ERROR].error.code, "role");
     CHECK(order(&bare, "probe", TOP)); /* that only asks */
-    CHECK(order(&holds, "divide", TOP));
+    CHECK(order(&teaches, "divide", TOP));
+    mem_text(&teaches, "{\"type\":\"command\",\"verb\":\"allow\",\"target\":\"sculpt\",\"args\":{\"enabled\":1}}");
+    CHECK(order(&bare, "undo", ""));
     mem_end(&looks);
     mem_end(&bare);
-    mem_end(&holds);
+    mem_end(&teaches);
     end();
 }
 
@@ -399,7 +402,7 @@ int main(void)
     RUN(a_cut_shows_the_inside_and_goes_again);
     RUN(what_cannot_be_done_is_refused_with_a_sentence_and_changes_nothing);
     RUN(hands_blow_up_and_pull_until_they_let_go);
-    RUN(who_holds_no_tool_and_teaches_nobody_sculpts_nothing);
+    RUN(who_has_no_right_sculpts_nothing);
     RUN_SERIAL(sixteen_wait_and_the_next_one_is_told);
     RUN(everybody_is_told_and_who_comes_late_begins_at_the_new_asset);
     RUN(the_tool_stays_held_and_its_poses_go_on);

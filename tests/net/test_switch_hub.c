@@ -181,10 +181,10 @@ static void what_cannot_be_is_refused_with_a_sentence(void)
     mem_text(&c, "{\"type\":\"command\",\"verb\":\"study_point\",\"target\":\"stone\",\"args\":{\"index\":1}}");
     until_answers(&c, NULL, n_answer(&c) + 1);
     CHECK(strstr(trouble(&c), "stone") != NULL);
-    /* who teaches nobody and holds no tool */
-    join(&d, "Ben", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
+    mem_text(&c, "{\"type\":\"command\",\"verb\":\"allow\",\"target\":\"configure\",\"args\":{\"enabled\":0}}");
+    join(&d, "Ben", PAL_WIRE_ROLE_TRAINEE, 0);
     CHECK(!order(&d, "study_point", "\"index\":1"));
-    CHECK(strstr(trouble(&d), "only for instructors and holders of a tool") != NULL);
+    CHECK(strstr(trouble(&d), "only for instructors, and trainees with the right configure") != NULL);
     mem_end(&c);
     mem_end(&d);
     end();

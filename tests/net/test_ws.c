@@ -36,6 +36,7 @@ static void begin(pal_server_options net_options)
     pal_diagnostic diag = {""};
     pal_session_options options = {.lease_s = 60, .wake = pal_server_gate_wake, .user = &gate};
     net_options.viewer_folder = folder;
+    net_options.open = true;
     if (pal_session_open(&organ.scene, &options, &diag, &session)) CHECK_FAIL("no session: %s", diag.text);
     if (pal_server_open(&net_options, &session, 1, &diag, &server)) {
         CHECK_FAIL("no server: %s", diag.text);

@@ -259,8 +259,14 @@ static inline void golden_control(pal_control_type type, pal_control *c)
         break;
     case PAL_CONTROL_MEMBERS:
         c->members.n_member = 2;
-        c->members.member[0] = (pal_wire_member){1, PAL_WIRE_ROLE_INSTRUCTOR, 0, 0xFF8000, "Ada"};
-        c->members.member[1] = (pal_wire_member){65535, PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE, 0x0080FF, "Bo"};
+        c->members.member[0] = (pal_wire_member){1, PAL_WIRE_ROLE_INSTRUCTOR, 0, 0xFF8000, "Ada", "", false};
+        c->members.member[1] =
+            (pal_wire_member){65535, PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE, 0x0080FF, "Bo", "steer cut", true};
+        c->members.n_locked = 1, c->members.locked_tool[0] = 3, c->members.locked = true;
+        break;
+    case PAL_CONTROL_ORDERS:
+        c->orders = (pal_wire_orders){
+            2, {{1, "Ada", "pause", "", "", 3.5}, {65535, "Bo", "material", "liver", "young_Pa 4500", 0.25}}};
         break;
     case PAL_CONTROL_ERROR:
         c->error = (pal_wire_error){"tool_taken", "tool 0 is held by Ada"};

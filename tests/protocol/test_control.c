@@ -224,7 +224,8 @@ static void largest_messages_fit_their_limit(void)
     full.members.n_member = PAL_WIRE_MEMBER_MAX;
     for (int i = 0; i < PAL_WIRE_MEMBER_MAX; i++) {
         pal_wire_member *m = &full.members.member[i];
-        *m = (pal_wire_member){65535, PAL_WIRE_ROLE_INSTRUCTOR, 31, 0xFFFFFF, ""};
+        *m = (pal_wire_member){65535, PAL_WIRE_ROLE_INSTRUCTOR, 31, 0xFFFFFF, "", "", true};
+        memset(m->rights, '"', sizeof m->rights - 1);
         memset(m->name, '"', sizeof m->name - 1);
     }
     CHECK_INT(pal_control_put(text, sizeof text, &full, &n), 0);

@@ -44,7 +44,7 @@ static void a_long_name_is_cut_at_a_whole_character(void)
     char name[400] = "";
     for (int k = 0; k < 60; k++) strcat(name, "\xe2\x82\xac");
     for (int k = 0; k < PAL_MEMBER_LIST_MAX; k++) {
-        int id = join(PAL_MEMBER_TRAINEE, name);
+        int id = join(PAL_MEMBER_INSTRUCTOR, name);
         REQUIRE(id > 0);
         const char *got = name_of(id);
         CHECK(strlen(got) < PAL_MEMBER_NAME);
@@ -98,13 +98,16 @@ static void an_id_in_use_is_not_given_again(void)
 static void a_full_table_refuses_and_an_id_is_never_used_twice(void)
 {
     pal_members_init(&list, 3);
-    for (int k = 0; k < PAL_MEMBER_LIST_MAX; k++) CHECK_INT(join(PAL_MEMBER_VIEWER, "v"), k + 1);
+    const int kept = PAL_MEMBER_INSTRUCTORS;
+    for (int k = 0; k < PAL_MEMBER_LIST_MAX - kept; k++) CHECK_INT(join(PAL_MEMBER_VIEWER, "v"), k + 1);
     int id = -5;
-    CHECK_INT(pal_members_join(&list, PAL_MEMBER_VIEWER, "one more", &id), PAL_ERR_FULL);
+    CHECK_INT(pal_members_join(&list, PAL_MEMBER_TRAINEE, "one more", &id), PAL_ERR_FULL);
     CHECK_INT(id, -5);
+    for (int k = 0; k < kept; k++) CHECK(join(PAL_MEMBER_INSTRUCTOR, "i") > 0);
+    CHECK_INT(pal_members_join(&list, PAL_MEMBER_INSTRUCTOR, "one more", &id), PAL_ERR_FULL);
     pal_members_leave(&list, 7);
     CHECK_INT(list.n_member, PAL_MEMBER_LIST_MAX - 1);
-    CHECK_INT(join(PAL_MEMBER_VIEWER, "new"), PAL_MEMBER_LIST_MAX + 1);
+    CHECK_INT(join(PAL_MEMBER_INSTRUCTOR, "new"), PAL_MEMBER_LIST_MAX + 1);
     CHECK(pal_members_find(&list, 7) == NULL);
     CHECK(pal_members_find(&list, 0) == NULL);
     pal_members_leave(&list, 7);

@@ -42,6 +42,12 @@ export class AppState {
         return this.ownTool < 0 ? undefined : this.tools[this.ownTool];
     }
 
+    /** may this member give the commands of a right? @param {string} right */
+    may(right) {
+        const own = this.members.get(this.ownId);
+        return own?.role === "instructor" || (own?.rights ?? "").split(" ").includes(right);
+    }
+
     countVertices() {
         this.figures.vertices = [...this.bodies.values()].reduce((n, body) => n + body.nVisible(), 0);
     }

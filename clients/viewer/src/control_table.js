@@ -17,7 +17,15 @@ const part = /** @type {const} */ ({
     "sculptable?": "bool",
 });
 
-const member = /** @type {const} */ ({ id: "u16", role: "role", name: "text", "tool?": "tool", colour: "u32" });
+const member = /** @type {const} */ ({
+    id: "u16",
+    role: "role",
+    name: "text",
+    "tool?": "tool",
+    colour: "u32",
+    "rights?": "text",
+    "muted?": "bool",
+});
 
 export const SERVER_MESSAGES = Object.freeze(
     /** @type {const} */ ({
@@ -83,7 +91,10 @@ export const SERVER_MESSAGES = Object.freeze(
             "unobserved_steps?": "u64",
             "devices?": [{ tool: "u32", "force_error_N?": "f64", "opening?": "f64" }],
         },
-        members: { members: [member] },
+        members: { members: [member], "locked_tools?": "numbers", "locked?": "bool" },
+        orders: {
+            orders: [{ id: "u16", name: "text", verb: "text", "target?": "text", "text?": "text", age_s: "f64" }],
+        },
         error: { code: "text", text: "text" },
         pong: { stamp_ms: "f64" },
         answer: { verb: "text", text: "text", "args?": "args" },

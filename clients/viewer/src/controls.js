@@ -84,9 +84,18 @@ export class Controls {
     /** the mode of sculpting exists while a part can be sculpted */
     offerSculpting() {
         const { input, sculpt, state } = this.page;
-        sculpt.offered = state.parts.some((part) => part.sculptable);
+        sculpt.offered = state.may("sculpt") && state.parts.some((part) => part.sculptable);
         buttonById("mode-sculpt").hidden = !sculpt.offered;
         if (!sculpt.offered && input.mode === "sculpt") this.setMode("pull");
+    }
+
+    /** a button that the server would refuse cannot be pressed */
+    showRights() {
+        const { state } = this.page;
+        const may = state.may("steer");
+        const frozen = state.status?.frozen === true;
+        for (const id of ["pause", "step"]) buttonById(id).disabled = !may;
+        buttonById("reset").disabled = !may && !frozen;
     }
 
     togglePause() {
@@ -98,6 +107,7 @@ export class Controls {
         buttonById("pause").textContent = paused ? "Resume" : "Pause";
         buttonById("pause").setAttribute("aria-pressed", String(paused));
         buttonById("step").hidden = !paused;
+        this.showRights();
     }
 
     toggleMesh() {

@@ -1,6 +1,7 @@
 // The connection of one viewer: join, assets, frames, credit, reconnection. Socket, fetch, clock and output are passed
 // in, so that the same code runs in the worker and under node --test.
 import { decodeAsset } from "./asset.js";
+import { CommandQueue } from "./command_queue.js";
 import { readControl } from "./control_reader.js";
 import { decodeField, readFieldHead } from "./field_decoder.js";
 import { FrameDecoder, readFrameHead } from "./frame_decoder.js";
@@ -9,6 +10,7 @@ import { applyTopologyDelta, readTopologyDeltaHead, shownOf } from "./topology_d
 import { KIND, POSE_FLAG, PROTOCOL, readHead, readTools, writeAck, writePose } from "./wire.js";
 
 export const REPEAT_MS = 50; // period of repeated poses of a resting tool: the server releases a silent one
+const TICKET = "ticket."; // prefix of the subprotocol that is a ticket
 const RETRY_MS = 500; // pause before the first reconnection, doubled with each failure
 const RETRY_MAX_MS = 5000;
 const PAGE_SILENCE_MS = 3000; // a page that has been silent for longer no longer holds its tool
@@ -16,6 +18,7 @@ const PING_MS = 1000;
 const FIGURES_MS = 500;
 const LATENCY_MAX_MS = 10000; // a larger value comes from the clock of another connection
 const SPARE_MAX = 4; // pairs of arrays that wait for reuse
+const CLOSE_FULL = 4003; // for now: tried again
 const CLOSE_UNREADABLE = 4900; // close code: the server sent what this page cannot read
 
 /** close codes after which reconnection is useless, with the text for the user */
@@ -24,8 +27,8 @@ const FINAL = new Map([
     [1008, "access denied"],
     [1009, "the server rejected a message of this page"],
     [4001, "this page sent too many messages"],
-    [4003, "the session is full"],
     [4004, "this session does not exist"],
+    [4005, "you cannot take part any more"],
 ]);
 
 /**
@@ -50,14 +53,16 @@ const FINAL = new Map([
  */
 /**
  * Messages from the page to the worker.
- * @typedef {{type: "connect", url: string, name: string, role: import("./control_table.js").Role}
+ * @typedef {{url: string, name: string, role: import("./control_table.js").Role, ticket: string}} Wishes of a join; a
+ *   ticket of "": none
+ * @typedef {({type: "connect"} & Wishes)
  *   | ({type: "pose"} & ToolPose)
  *   | {type: "control", message: ClientMessage}
  *   | ({type: "reuse", part: number} & FrameArrays)} WorkerMessage
  */
 /**
  * @typedef {{
- *   open: (url: string, protocol: string) => WebSocket,
+ *   open: (url: string, protocols: string[]) => WebSocket,
  *   get: (url: string) => Promise<ArrayBuffer>,
  *   post: (message: PageMessage, transfer?: Transferable[]) => void,
  *   now: () => number,
@@ -77,8 +82,9 @@ const closeReason = (error) =>
 export class Link {
     /** @type {WebSocket | null} */
     socket = null;
-    /** @type {{url: string, name: string, role: import("./control_table.js").Role}} */
-    options = { url: "", name: "Guest", role: "trainee" };
+    /** @type {Wishes} */
+    options = { url: "", name: "Guest", role: "trainee", ticket: "" };
+    commands = new CommandQueue();
     tries = 0;
     generation = 0; // of the connection: events of older ones are ignored
     poseSeq = 0;
@@ -116,6 +122,7 @@ export class Link {
 
     reset() {
         this.lastPose = null;
+        this.commands.waiting = [];
         this.parts.clear();
         this.requested.clear();
         this.earlyFrames.clear();
@@ -126,7 +133,7 @@ export class Link {
         this.ownTool = -1;
     }
 
-    /** @param {{url: string, name: string, role: import("./control_table.js").Role}} options */
+    /** @param {Wishes} options */
     connect(options) {
         this.options = options;
         this.tries = 0;
@@ -141,7 +148,8 @@ export class Link {
         const generation = this.generation;
         this.reset();
         this.report("connecting", this.tries ? "reconnecting" : "connecting");
-        const socket = this.env.open(this.options.url, PROTOCOL);
+        const { ticket, url } = this.options;
+        const socket = this.env.open(url, ticket ? [PROTOCOL, TICKET + ticket] : [PROTOCOL]);
         socket.binaryType = "arraybuffer";
         this.socket = socket;
         socket.onopen = () => {
@@ -173,7 +181,11 @@ export class Link {
                 return;
             }
             const pause = Math.min(RETRY_MAX_MS, RETRY_MS * 2 ** this.tries++);
-            this.report("lost", "connection lost, reconnecting");
+            const full = event.code === CLOSE_FULL;
+            this.report(
+                "lost",
+                full ? `${event.reason || "the session is full"}, trying again` : "connection lost, reconnecting",
+            );
             const next = this.generation;
             this.env.later(() => next === this.generation && this.dial(), pause);
         };
@@ -186,6 +198,20 @@ export class Link {
 
     /** @param {ClientMessage} message */
     send(message) {
+        if (message.type !== "command") return this.write(message);
+        this.commands.add(message);
+        this.sendCommands();
+    }
+
+    sendCommands() {
+        const generation = this.generation;
+        for (const command of this.commands.take(this.env.now())) this.write(command);
+        const pause = this.commands.pause();
+        if (pause !== null) this.env.later(() => generation === this.generation && this.sendCommands(), pause + 1);
+    }
+
+    /** @param {ClientMessage} message */
+    write(message) {
         if (this.socket?.readyState === 1) this.socket.send(JSON.stringify(message));
     }
 

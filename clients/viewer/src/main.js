@@ -9,11 +9,13 @@ import { byId, htmlById, inputById } from "./dom.js";
 import { WRITERS } from "./exporters.js";
 import { FieldDisplay } from "./field_display.js";
 import { Layout } from "./layout.js";
+import { MembersPanel } from "./members_panel.js";
 import { Messages } from "./messages.js";
 import { PlanPanel } from "./plan_panel.js";
 import { PoseSender } from "./pose_sender.js";
 import { SculptPanel } from "./sculpt_panel.js";
 import { Stage } from "./stage.js";
+import { takeTicket } from "./ticket.js";
 import { ToolInput } from "./tool_input.js";
 import { ToolMarks } from "./tool_marks.js";
 
@@ -28,6 +30,7 @@ const send = (message) => post({ type: "control", message });
 /** @param {import("./sculpt_commands.js").Command & {target?: string}} command */
 const sendCommand = ({ verb, target = "", args }) => send({ type: "command", verb, target, args });
 
+const ticket = takeTicket(location, history, () => sessionStorage);
 const state = new AppState();
 const layout = new Layout();
 const stage = makeStage();
@@ -39,6 +42,7 @@ const poses = new PoseSender(state, post, () => stage.size);
 const fields = new FieldDisplay(state, stage, send, layout);
 const marks = new ToolMarks(stage, htmlById("labels"));
 const panel = new PlanPanel(document, sendCommand);
+const members = new MembersPanel(document, sendCommand, () => performance.now());
 const accuracy = new AccuracyPanel(document, sendCommand);
 const sculpt = new SculptPanel(document, sendCommand, save);
 const input = new ToolInput(
@@ -55,7 +59,7 @@ input.onClick = (/** @type {number[]} */ position) => sculpt.click(position);
 input.onFirstDrag = () => htmlById("hint").classList.add("gone");
 const showFigures = () => messages.showFigures();
 const controls = new Controls({ state, stage, layout, input, fields, accuracy, sculpt, send, showFigures });
-const panels = { panel, accuracy, sculpt, controls };
+const panels = { panel, members, accuracy, sculpt, controls };
 const messages = new Messages({ state, stage, layout, bodies, fields, input, marks, send, ...panels });
 worker.onmessage = (/** @type {MessageEvent<import("./link.js").PageMessage>} */ { data }) => messages.take(data);
 
@@ -133,8 +137,9 @@ function connect() {
     const session = query.get("session");
     const scheme = location.protocol === "https:" ? "wss" : "ws";
     const url = `${scheme}://${location.host}/ws${session ? "?session=" + encodeURIComponent(session) : ""}`;
-    const role = ROLES.find((known) => known === query.get("role")) ?? "trainee";
-    post({ type: "connect", url, name: inputById("name").value.trim() || "Guest", role });
+    // with a ticket: whatever it allows
+    const role = ROLES.find((known) => known === query.get("role")) ?? (ticket ? "instructor" : "trainee");
+    post({ type: "connect", url, name: inputById("name").value.trim() || "Guest", role, ticket });
 }
 
 inputById("name").value = new URLSearchParams(location.search).get("name") ?? storedName();

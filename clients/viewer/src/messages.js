@@ -11,7 +11,8 @@ import { sameTools } from "./tool_marks.js";
  *   state: import("./app_state.js").AppState, stage: import("./stage.js").Stage, layout: import("./layout.js").Layout,
  *   bodies: import("./body_set.js").BodySet, fields: import("./field_display.js").FieldDisplay,
  *   input: import("./tool_input.js").ToolInput, marks: import("./tool_marks.js").ToolMarks,
- *   panel: import("./plan_panel.js").PlanPanel, accuracy: import("./accuracy_panel.js").AccuracyPanel,
+ *   panel: import("./plan_panel.js").PlanPanel, members: import("./members_panel.js").MembersPanel,
+ *   accuracy: import("./accuracy_panel.js").AccuracyPanel,
  *   sculpt: import("./sculpt_panel.js").SculptPanel, controls: import("./controls.js").Controls,
  *   send: (message: import("./control_table.js").ClientMessage) => void
  * }} Page the parts of the page that messages act on
@@ -79,6 +80,8 @@ export class Messages {
                 return this.status(message);
             case "members":
                 return this.members(message);
+            case "orders":
+                return this.page.members.takeOrders(message);
             case "error":
                 return this.error(message);
             case "answer":
@@ -103,6 +106,7 @@ export class Messages {
         if (!sameScene) stage.frameBox([message.box_min_m, message.box_max_m], message.up);
         input.radius = message.tools[Math.max(0, state.ownTool)]?.radius_m ?? RADIUS_SHARE * stage.size;
         bodies.truncate(message.parts.length);
+        this.page.members.begin();
         state.plan = message;
         state.status = null;
         this.showComponents();
@@ -152,15 +156,23 @@ export class Messages {
     }
 
     /** @param {Of<"members">} message */
-    members({ members }) {
-        const { panel, send, stage, state } = this.page;
+    members(message) {
+        const { controls, members: panel, send, stage, state } = this.page;
+        const { members, locked_tools } = message;
         state.members = new Map(members.map((member) => [member.id, member]));
         const own = state.members.get(state.ownId);
         state.ownTool = own?.tool ?? -1;
         const taken = new Set(members.map((member) => member.tool));
-        const free = (state.hello?.tools ?? []).some((_, i) => !taken.has(i));
-        if (own && state.ownTool < 0 && own.role !== "viewer" && free) send({ type: "take_tool", tool: -1 });
-        panel.showMembers(members, state.ownId);
+        const instructs = own?.role === "instructor";
+        const free = (state.hello?.tools ?? []).some(
+            (_, i) => !taken.has(i) && (instructs || !locked_tools?.includes(i)),
+        );
+        if (own && state.ownTool < 0 && own.role !== "viewer" && !own.muted && free)
+            send({ type: "take_tool", tool: -1 });
+        panel.show(message, state.ownId, state.hello?.tools ?? []);
+        controls.showRights();
+        controls.offerSculpting();
+        this.showComponents();
         this.showHint();
         stage.dirty = true; // names beside tools
     }
@@ -199,16 +211,24 @@ export class Messages {
         const hint = htmlById("hint");
         if (state.ownTool < 0 && state.members.has(state.ownId)) {
             hint.classList.remove("gone");
-            hint.textContent = "All tools are in use. You are watching; you get a tool as soon as one is free.";
+            hint.textContent = this.watchingText();
         } else if (!hint.classList.contains("gone"))
             hint.textContent = "Drag the organ to pull it. Drag beside it to look around.";
+    }
+
+    /** why a member without a tool moves nothing @returns {string} */
+    watchingText() {
+        const own = this.page.state.members.get(this.page.state.ownId);
+        if (own?.role === "viewer") return "You are watching. Drag to look around.";
+        if (own?.muted) return "An instructor lets you watch only. Drag to look around.";
+        return "All tools are in use. You are watching; you get a tool as soon as one is free.";
     }
 
     /** components come and go with fields, switches and other methods */
     showComponents() {
         const { panel, state } = this.page;
         const components = componentsOf(state.plan, state.status);
-        const switches = state.hello?.you.role === "instructor" && state.plan.component_parts !== undefined;
+        const switches = state.may("component") && state.plan.component_parts !== undefined;
         const key = JSON.stringify([components, switches]);
         if (key === this.listed) return;
         this.listed = key;
@@ -219,6 +239,7 @@ export class Messages {
     showFigures() {
         const { accuracy, panel, state } = this.page;
         if (htmlById("panel").hidden || !state.status) return;
+        this.page.members.showOrders();
         panel.showStatus(state.status, state.figures, state.parts);
         htmlById("idle").textContent = idleText({
             field: state.field !== "none",

@@ -1,5 +1,5 @@
 // The panel of figures: rates and times, the components of the plan with their times and switches, bodies that are
-// stopped or asleep, activity of bodies that adapt, members.
+// stopped or asleep, activity of bodies that adapt.
 import { htmlById } from "./dom.js";
 import { activeText, barLengths, bodyRemarks, fixedReason, rateText } from "./plan_list.js";
 
@@ -23,7 +23,6 @@ export class PlanPanel {
         this.bodies = htmlById("bodies", page);
         this.components = /** @type {HTMLTableSectionElement} */ (page.querySelector("#components tbody"));
         this.active = htmlById("active", page);
-        this.members = htmlById("members", page);
         /** @type {Map<string, HTMLElement>} */
         this.values = new Map();
         /** @type {{bar: HTMLElement, value: HTMLElement, index: number | null}[]} */
@@ -148,22 +147,5 @@ export class PlanPanel {
         while (this.active.children.length > lines.length) this.active.lastElementChild?.remove();
         while (this.active.children.length < lines.length) this.active.append(document.createElement("p"));
         lines.forEach((line, i) => (this.active.children[i].textContent = line));
-    }
-
-    /** @param {import("./control_table.js").Member[]} members @param {number} ownId */
-    showMembers(members, ownId) {
-        this.members.replaceChildren(
-            ...members.map(({ id, name, role, tool, colour }) => {
-                const item = document.createElement("li");
-                const title = document.createElement("span");
-                const note = document.createElement("small");
-                const holds = (tool ?? -1) >= 0;
-                item.style.color = cssColour(colour);
-                title.textContent = name + (id === ownId ? " (you)" : "");
-                note.textContent = "  " + (holds ? role : role === "viewer" ? "watching" : "no tool");
-                item.append(title, note);
-                return item;
-            }),
-        );
     }
 }

@@ -10,7 +10,7 @@ import { Link, REPEAT_MS } from "./link.js";
  */
 const scope = /** @type {WorkerScope} */ (/** @type {unknown} */ (globalThis));
 const link = new Link({
-    open: (url, protocol) => new WebSocket(url, protocol),
+    open: (url, protocols) => new WebSocket(url, protocols),
     get: async (url) => {
         const response = await fetch(url);
         if (!response.ok) throw new Error(`${url}: ${response.status}`);

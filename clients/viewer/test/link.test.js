@@ -82,7 +82,7 @@ function stand() {
 /** a connection that has joined; the part's epoch is that of the golden frames */
 async function joined() {
     const s = stand();
-    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
+    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee", ticket: "" });
     s.sockets[0].accept();
     const epoch = new DataView(load("frame_bend.bin").buffer).getUint32(8, true);
     const part = new DataView(load("frame_bend.bin").buffer).getUint16(6, true);
@@ -93,13 +93,20 @@ async function joined() {
 
 test("joins with the protocol's name, asks for any tool and for patches", () => {
     const s = stand();
-    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
-    assert.equal(s.sockets[0].protocol, "palpate.v2");
+    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee", ticket: "" });
+    assert.deepEqual(s.sockets[0].protocol, ["palpate.v2"]);
     assert.equal(s.sockets[0].sent.length, 0);
     s.sockets[0].accept();
     assert.deepEqual(s.sockets[0].texts(), [
         { type: "join", name: "Ada", role: "trainee", tool: -1, topology_deltas: true },
     ]);
+});
+
+test("offers its ticket beside the protocol, where no address shows it", () => {
+    const s = stand();
+    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "instructor", ticket: "AQ-_" });
+    assert.deepEqual(s.sockets[0].protocol, ["palpate.v2", "ticket.AQ-_"]);
+    assert.equal(s.sockets[0].url, "ws://host:1/ws");
 });
 
 test("keeps the newest frame until its asset has come, then shows it", async () => {
@@ -127,7 +134,7 @@ test("keeps the newest field until its asset has come, drops one of an older epo
     const field = load("field.bin");
     const head = readFieldHead(field);
     const n = 301;
-    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "viewer" });
+    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "viewer", ticket: "" });
     s.sockets[0].accept();
     const parts = Array.from({ length: head.part + 1 }, () => partInfo({ epoch: head.epoch }));
     s.sockets[0].receive(hello({ parts }));
@@ -195,7 +202,7 @@ test("a resting tool is said again until the page has been silent for 3 s", asyn
 
 test("reconnects with growing pauses after a lost connection", () => {
     const s = stand();
-    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
+    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee", ticket: "" });
     const pauses = [];
     for (let i = 0; i < 6; i++) {
         /** @type {any} */ (s.sockets[i]).onclose({ code: 1006, reason: "" });
@@ -210,7 +217,7 @@ test("reconnects with growing pauses after a lost connection", () => {
 
 test("a server whose asset cannot be read is asked again ever more slowly", async () => {
     const s = stand();
-    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
+    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee", ticket: "" });
     const pauses = [];
     for (let i = 0; i < 4; i++) {
         s.sockets[i].accept();
@@ -281,17 +288,25 @@ test("an asset that arrives after a newer one was asked for is not shown", async
 
 test("says why and stays away after a refusal", () => {
     const s = stand();
-    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
-    /** @type {any} */ (s.sockets[0]).onclose({ code: 4003, reason: "" });
+    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee", ticket: "" });
+    /** @type {any} */ (s.sockets[0]).onclose({ code: 4005, reason: "Bo has removed you" });
     assert.equal(s.waiting.length, 0);
-    assert.match(s.of("state").at(-1).text, /full/);
+    assert.match(s.of("state").at(-1).text, /cannot take part.*Bo has removed you/);
+});
+
+test("a full session is tried again, and the page says so", () => {
+    const s = stand();
+    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee", ticket: "" });
+    /** @type {any} */ (s.sockets[0]).onclose({ code: 4003, reason: "the session has no free place" });
+    assert.equal(s.waiting.length, 1);
+    assert.match(s.of("state").at(-1).text, /no free place, trying again/);
 });
 
 test("a message that cannot be read closes the connection, an old connection is not heard", async () => {
     const { s } = await joined();
     s.sockets[0].receive(new Uint8Array([1, 2, 3, 4, 5, 6, 7, 8, 9]));
     assert.equal(s.sockets[0].closed, 4900);
-    s.link.connect({ url: "ws://host:1/ws", name: "Bea", role: "viewer" });
+    s.link.connect({ url: "ws://host:1/ws", name: "Bea", role: "viewer", ticket: "" });
     const n = s.posted.length;
     s.sockets[0].receive(hello());
     assert.equal(s.posted.length, n);

@@ -16,8 +16,9 @@ enum { PAL_PEER_REASON = 124 }; /* a websocket close reason holds 123 bytes */
 /* one connection; a transport embeds it in its own struct */
 typedef struct pal_peer {
     const pal_transport_ops *ops;
-    void *client;  /* the hub's data; NULL after closed or when refused */
-    int drop_code; /* nonzero: closing with this code, nothing more is sent or received */
+    void *client;     /* the hub's data; NULL after closed or when refused */
+    char address[46]; /* IP address from which it comes; "": none */
+    int drop_code;    /* nonzero: closing with this code, nothing more is sent or received */
     char drop_reason[PAL_PEER_REASON];
 } pal_peer;
 
@@ -32,8 +33,8 @@ typedef struct pal_reply {
 
 /* callbacks of the hub */
 typedef struct pal_peer_events {
-    /* a peer connected for a session ("": the first); may drop it at once */
-    void (*opened)(void *user, pal_peer *peer, const char *session);
+    /* a peer connected for a session ("": the first) with a ticket ("": none); may drop it at once */
+    void (*opened)(void *user, pal_peer *peer, const char *session, const char *ticket);
     /* one whole message; n_byte <= 4096 (the transport drops longer ones with 1009) */
     void (*received)(void *user, pal_peer *peer, const uint8_t *bytes, size_t n_byte, bool text);
     bool (*waiting)(void *user, const pal_peer *peer); /* would next return a message? */

@@ -8,7 +8,7 @@
  * byte. What is received: at most 4096 bytes a message. Browsers: Origin must be this host, and Host a loopback name;
  * where other machines may connect, also an IP address, this machine's name or one that is listed. So no page reaches
  * the server by a foreign name that resolves here (DNS rebinding). */
-#include "protocol/control.h"
+#include "protocol/ticket.h"
 #include "server/base/log.h"
 #include "server/net/transport/transport.h"
 
@@ -256,17 +256,29 @@ static int finish(connection *c)
     return -1;
 }
 
+/* the ticket among the subprotocols that a client offers, cut off in place; "": none */
+static const char *ticket_of(char *offered)
+{
+    char *at = strstr(offered, PAL_TICKET_PREFIX);
+    if (!at) return "";
+    at += strlen(PAL_TICKET_PREFIX);
+    at[strcspn(at, ", ")] = 0;
+    return at;
+}
+
 static int established(struct lws *wsi, connection *c)
 {
     pal_transport *t = transport_of(wsi);
-    char argument[64];
+    char argument[64], offered[256] = "";
     const char *session = lws_get_urlarg_by_name(wsi, "session=", argument, sizeof argument);
+    (void)lws_hdr_copy(wsi, offered, sizeof offered, WSI_TOKEN_PROTOCOL);
     memset(c, 0, sizeof *c);
     c->wsi = wsi;
     c->peer.ops = &pal_ws_transport;
     c->open = true;
     lws_set_timer_usecs(wsi, LWS_SET_TIMER_USEC_CANCEL);
-    t->events.opened(t->events.user, &c->peer, session ? session : "");
+    lws_get_peer_simple(wsi, c->peer.address, sizeof c->peer.address);
+    t->events.opened(t->events.user, &c->peer, session ? session : "", ticket_of(offered));
     return 0;
 }
 

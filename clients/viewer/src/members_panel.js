@@ -1,0 +1,192 @@
+// Who is here, who did what, and what an instructor may do about it.
+import { buttonById, htmlById } from "./dom.js";
+import { cssColour } from "./plan_panel.js";
+
+/**
+ * @typedef {import("./control_table.js").Member} Member
+ * @typedef {{verb: string, target?: string, args: Record<string, number>}} Command
+ * @typedef {{id: number, name: string, text: string, at: number}} Order
+ */
+
+/** what trainees may be let do, with the words for it */
+export const RIGHTS = Object.freeze({
+    steer: "pause and reset",
+    material: "change material",
+    component: "switch components",
+    configure: "change accuracy",
+    sculpt: "sculpt",
+    cut: "cut open",
+});
+const ORDERS_SHOWN = 6;
+
+/** @param {string} text @param {string} title @param {() => void} action */
+function button(text, title, action) {
+    const made = Object.assign(document.createElement("button"), { textContent: text, title, type: "button" });
+    made.onclick = action;
+    return made;
+}
+
+/** @param {string} text @param {boolean} checked @param {(checked: boolean) => void} action */
+function checkbox(text, checked, action) {
+    const label = document.createElement("label");
+    const box = Object.assign(document.createElement("input"), { type: "checkbox", checked });
+    box.onchange = () => action(box.checked);
+    label.append(box, ` ${text}`);
+    return label;
+}
+
+/** "3 s ago", "2 min ago" @param {number} seconds */
+export const agoText = (seconds) =>
+    seconds < 60 ? `${Math.max(0, Math.round(seconds))} s ago` : `${Math.round(seconds / 60)} min ago`;
+
+export class MembersPanel {
+    /** @type {Order[]} newest first */
+    orders = [];
+    opened = 0; // id of the member whose choices are shown
+    /** @type {Member[]} */
+    members = [];
+
+    /** @param {Document} page @param {(command: Command) => void} send @param {() => number} now ms */
+    constructor(page, send, now) {
+        this.send = send;
+        this.now = now;
+        this.list = htmlById("members", page);
+        this.room = htmlById("room-choices", page);
+        this.order = htmlById("orders", page);
+        buttonById("lock-session", page).onclick = () =>
+            this.send({ verb: "lock_session", args: { enabled: this.locked ? 0 : 1 } });
+    }
+
+    locked = false;
+
+    /**
+     * @param {Extract<import("./control_table.js").ServerMessage, {type: "members"}>} message
+     * @param {number} ownId @param {{name: string}[]} tools
+     */
+    show(message, ownId, tools) {
+        const instructs = message.members.find(({ id }) => id === ownId)?.role === "instructor";
+        this.members = message.members;
+        this.locked = message.locked === true;
+        this.list.replaceChildren(...message.members.map((member) => this.row(member, ownId, instructs)));
+        this.room.hidden = !instructs;
+        if (!instructs) return;
+        const lock = buttonById("lock-session");
+        lock.textContent = this.locked ? "Let others join" : "Let nobody else join";
+        lock.setAttribute("aria-pressed", String(this.locked));
+        htmlById("tool-choices").replaceChildren(
+            ...tools.map(({ name }, tool) => this.toolRow(tool, name, message, ownId)),
+        );
+    }
+
+    /** @param {Member} member @param {number} ownId @param {boolean} instructs */
+    row(member, ownId, instructs) {
+        const { id, name, role, tool, colour, muted } = member;
+        const item = document.createElement("li");
+        const title = document.createElement("span");
+        const note = document.createElement("small");
+        const holds = (tool ?? -1) >= 0;
+        const dot = document.createElement("i");
+        dot.style.background = cssColour(colour);
+        title.textContent = name + (id === ownId ? " (you)" : "");
+        note.textContent =
+            "  " + (muted ? "may only watch" : holds ? role : role === "viewer" ? "watching" : "no tool");
+        item.append(dot, title, note);
+        if (!instructs || id === ownId || role === "instructor") return item;
+        const more = button("…", `What ${name} may do`, () => {
+            this.opened = this.opened === id ? 0 : id;
+            choices.hidden = this.opened !== id;
+            more.setAttribute("aria-expanded", String(!choices.hidden));
+        });
+        const choices = this.choices(member);
+        choices.hidden = this.opened !== id;
+        more.className = "more";
+        more.setAttribute("aria-expanded", String(!choices.hidden));
+        item.append(more, choices);
+        return item;
+    }
+
+    /** @param {Member} member */
+    choices({ id, name, role, rights, muted }) {
+        const choices = document.createElement("div");
+        const has = (rights ?? "").split(" ");
+        choices.className = "choices";
+        if (role === "trainee")
+            for (const [right, text] of Object.entries(RIGHTS))
+                choices.append(
+                    checkbox(`may ${text}`, has.includes(right), (enabled) =>
+                        this.send({ verb: "allow", target: right, args: { member: id, enabled: enabled ? 1 : 0 } }),
+                    ),
+                );
+        choices.append(
+            checkbox("may only watch", muted === true, (enabled) =>
+                this.send({ verb: "mute", args: { member: id, enabled: enabled ? 1 : 0 } }),
+            ),
+            button("Remove", `Close the connection of ${name}`, () =>
+                this.send({ verb: "remove", args: { member: id } }),
+            ),
+            button("Ban", `Remove ${name}, who may not come back`, () =>
+                this.send({ verb: "ban", args: { member: id } }),
+            ),
+        );
+        return choices;
+    }
+
+    /**
+     * @param {number} tool @param {string} name
+     * @param {{members: Member[], locked_tools?: number[]}} message @param {number} ownId
+     */
+    toolRow(tool, name, { members, locked_tools }, ownId) {
+        const row = document.createElement("div");
+        const holder = Object.assign(document.createElement("select"), { title: `Who holds ${name}` });
+        holder.setAttribute("aria-label", `Who holds ${name}`);
+        holder.append(new Option("nobody", "0"));
+        for (const { id, name: who, role, muted } of members)
+            if (role !== "viewer" && !muted) holder.append(new Option(id === ownId ? `${who} (you)` : who, String(id)));
+        holder.value = String(members.find((member) => member.tool === tool)?.id ?? 0);
+        holder.onchange = () => this.send({ verb: "hand_over", args: { tool, member: Number(holder.value) } });
+        const locked = locked_tools?.includes(tool) === true;
+        row.append(
+            name,
+            holder,
+            checkbox("locked", locked, (enabled) =>
+                this.send({ verb: "lock_tool", args: { tool, enabled: enabled ? 1 : 0 } }),
+            ),
+        );
+        return row;
+    }
+
+    /** @param {Extract<import("./control_table.js").ServerMessage, {type: "orders"}>} message */
+    takeOrders({ orders }) {
+        for (const { id, name, verb, target, text, age_s } of orders) {
+            const numbers = text?.replace(/\bmember (\d+)/, (_, member) => this.nameOf(Number(member)));
+            const what = [verb.replaceAll("_", " "), target, numbers].filter(Boolean).join(" ");
+            this.orders.unshift({ id, name, text: what, at: this.now() - 1000 * age_s });
+        }
+        this.orders.length = Math.min(this.orders.length, ORDERS_SHOWN);
+        this.showOrders();
+    }
+
+    showOrders() {
+        this.order.replaceChildren(
+            ...this.orders.map(({ name, text, at }) => {
+                const item = document.createElement("li");
+                const ago = Object.assign(document.createElement("small"), {
+                    textContent: ` ${agoText((this.now() - at) / 1000)}`,
+                });
+                item.append(Object.assign(document.createElement("b"), { textContent: name }), ` ${text}`, ago);
+                return item;
+            }),
+        );
+    }
+
+    /** @param {number} id */
+    nameOf(id) {
+        return this.members.find((member) => member.id === id)?.name ?? (id ? `member ${id}` : "nobody");
+    }
+
+    begin() {
+        this.orders = [];
+        this.opened = 0;
+        this.showOrders();
+    }
+}
