@@ -7,7 +7,9 @@
  * A link connects and joins. After a loss it reconnects by timer, with pauses that double from 0.25 s to 5 s, until it
  * is closed or the server refuses permanently (protocol/README.md, "Closing"). Sending never blocks: the newest pose
  * and the newest acknowledgement wait in one slot each, control messages in a queue of 16. One message is written each
- * time the socket is writable, control first. Only plain ws URLs are accepted; a proxy terminates TLS.
+ * time the socket is writable, control first. wss and https URLs use TLS: the server's certificate must be signed by an
+ * authority of the system, or by that of the PEM file that the environment variable PALPATE_CA names; that of
+ * this machine itself is not checked.
  *
  *     pal_link_loop *loop; pal_link *link;
  *     pal_link_loop_create(&loop);
@@ -55,8 +57,8 @@ typedef struct pal_link_events {
 } pal_link_events;
 
 typedef struct pal_link_options {
-    const char *url;  /* ws://host[:port][/path][?session=NAME][#TICKET]; http:// is equivalent, so that the address
-                         that a server prints can be given; default path "/ws"; copied. Without a ticket there:
+    const char *url;  /* ws[s]://host[:port][/path][?session=NAME][#TICKET]; http[s]:// is equivalent, so that the
+                         address  that a server prints can be given; default path "/ws"; copied. Without a ticket there:
                          that of the environment variable PALPATE_TICKET */
     const char *name; /* of the member; copied                                             */
     pal_wire_role role;

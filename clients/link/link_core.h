@@ -31,11 +31,12 @@ struct pal_link_loop {
     link_watch *watches;
 };
 
-/* parts of ws://host[:port][/path][?query][#ticket] or http:// */
+/* parts of ws://host, wss://host[:port][/path][?query][#ticket] or http:// */
 typedef struct link_address {
     char host[LINK_HOST_BYTES], path[LINK_PATH_BYTES]; /* path and query */
     char ticket[PAL_TICKET_TEXT];                      /* "": none       */
     int port;
+    bool tls;
 } link_address;
 pal_err link_address_parse(const char *url, link_address *out, pal_diagnostic *diag);
 /* what both kinds of connection ask for; object: of the callback, wsi: where it is kept */

@@ -396,7 +396,10 @@ int link_ws_callback(struct lws *wsi, enum lws_callback_reasons reason, void *us
         break;
     case LWS_CALLBACK_CLIENT_CONNECTION_ERROR:
         lws_set_opaque_user_data(wsi, NULL);
-        link_lost(link, in ? in : "no connection");
+        link_lost(link, !in ? "no connection"
+                        : link->address.tls && strstr((const char *)in, "SSL")
+                            ? "the server's certificate is not trusted, or it does not speak TLS"
+                            : in);
         break;
     case LWS_CALLBACK_CLOSED_CLIENT_HTTP: /* before the handshake was answered: the library reports one or the other */
     case LWS_CALLBACK_CLIENT_CLOSED:

@@ -22,6 +22,11 @@ const pal_flag pal_config_keys[PAL_CONFIG_KEYS] = {
      "let other machines connect: needed for any address but this machine's own"},
     {"hosts", "NAME,...", PAL_FLAG_TEXT, NULL, 0, 0,
      "names by which other machines reach this one (its addresses and its own name)"},
+    {"tls_cert", "FILE", PAL_FLAG_TEXT, NULL, 0, 0,
+     "certificate, or chain of them, in PEM: serve https and wss (none)"},
+    {"tls_key", "FILE", PAL_FLAG_TEXT, NULL, 0, 0, "key of that certificate, in PEM"},
+    {"health", "[ADDRESS:]PORT", PAL_FLAG_TEXT, NULL, 0, 0,
+     "serve /healthz, /readyz and /metrics there, and only there (on the main port, unless others may connect)"},
     {"open", NULL, PAL_FLAG_SWITCH, NULL, 0, 1,
      "for a demo: whoever connects may be instructor or trainee, take tools, edit and pause (only with a ticket)"},
     {"keys", "FILE", PAL_FLAG_TEXT, NULL, 0, 0, "key file of the tickets that palpate ticket makes (none)"},
@@ -35,10 +40,11 @@ const pal_flag pal_config_keys[PAL_CONFIG_KEYS] = {
 };
 /* where a key is stored, in the order of the keys */
 static const size_t place[PAL_CONFIG_KEYS] = {
-    offsetof(pal_config, listen), offsetof(pal_config, port),    offsetof(pal_config, allow_remote),
-    offsetof(pal_config, hosts),  offsetof(pal_config, open),    offsetof(pal_config, keys),
-    offsetof(pal_config, viewer), offsetof(pal_config, error_m), offsetof(pal_config, max_clients),
-    offsetof(pal_config, lcm),    offsetof(pal_config, log),     offsetof(pal_config, record),
+    offsetof(pal_config, listen), offsetof(pal_config, port),     offsetof(pal_config, allow_remote),
+    offsetof(pal_config, hosts),  offsetof(pal_config, tls_cert), offsetof(pal_config, tls_key),
+    offsetof(pal_config, health), offsetof(pal_config, open),     offsetof(pal_config, keys),
+    offsetof(pal_config, viewer), offsetof(pal_config, error_m),  offsetof(pal_config, max_clients),
+    offsetof(pal_config, lcm),    offsetof(pal_config, log),      offsetof(pal_config, record),
 };
 
 void pal_config_default(pal_config *config)
@@ -148,7 +154,7 @@ pal_err pal_config_environment(pal_config *config, char *const *variable, pal_di
         char name[VARIABLE], key[VARIABLE];
         if (!text || strncmp(*variable, prefix, sizeof prefix - 1) != 0) continue;
         snprintf(name, sizeof name, "%.*s", (int)(text - *variable), *variable);
-        if (!strcmp(name, "PALPATE_CONFIG") || !strcmp(name, "PALPATE_TICKET")) continue;
+        if (!strcmp(name, "PALPATE_CONFIG") || !strcmp(name, "PALPATE_TICKET") || !strcmp(name, "PALPATE_CA")) continue;
         snprintf(key, sizeof key, "%s", name + sizeof prefix - 1);
         for (char *c = key; *c; c++) *c = (char)tolower((unsigned char)*c);
         PAL_TRY(pal_config_set(&fresh, key, text + 1, name, diag));

@@ -9,13 +9,15 @@
 #include "server/base/flags.h"
 #include "server/base/log.h"
 
-enum { PAL_CONFIG_TEXT = 256, PAL_CONFIG_KEYS = 12 };
+enum { PAL_CONFIG_TEXT = 256, PAL_CONFIG_KEYS = 15 };
 
 typedef struct pal_config {
     char listen[PAL_CONFIG_TEXT]; /* "127.0.0.1"                                                         */
     int port;                     /* 8090; 0: any free port                                              */
     bool allow_remote;            /* false: only loopback addresses may be listened on                   */
     char hosts[PAL_CONFIG_TEXT];  /* "a,b": names by which other machines reach it                      */
+    char tls_cert[PAL_CONFIG_TEXT], tls_key[PAL_CONFIG_TEXT]; /* PEM files; "": no TLS              */
+    char health[PAL_CONFIG_TEXT]; /* "9090", "0.0.0.0:9090"; "": on the main port                        */
     bool open;                    /* whoever connects is what it asks to be; false: by ticket           */
     char keys[PAL_CONFIG_TEXT];   /* key file of tickets; "": none                                      */
     char viewer[PAL_CONFIG_TEXT]; /* folder of the page's files; "": the one beside the program          */
@@ -34,8 +36,8 @@ void pal_config_default(pal_config *config);
 pal_err pal_config_file(pal_config *config, const char *path, pal_diagnostic *diag);
 /* the same from memory: name is used in messages */
 pal_err pal_config_parse(pal_config *config, const char *name, const char *json, size_t n_byte, pal_diagnostic *diag);
-/* every PALPATE_ variable of environ-like list (NULL-terminated "KEY=value" texts), but PALPATE_TICKET, which is of
- * clients, and PALPATE_CONFIG, the file to read when there is no --config. All or nothing. */
+/* every PALPATE_ variable of environ-like list (NULL-terminated "KEY=value" texts), but PALPATE_TICKET and PALPATE_CA,
+ * which are of clients, and PALPATE_CONFIG, the file to read when there is no --config. All or nothing. */
 pal_err pal_config_environment(pal_config *config, char *const *variable, pal_diagnostic *diag);
 /* one key from text; where ("--port", "PALPATE_PORT") is used in messages */
 pal_err pal_config_set(pal_config *config, const char *key, const char *text, const char *where, pal_diagnostic *diag);

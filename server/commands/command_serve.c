@@ -160,6 +160,9 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
                                   .port = run->config.port,
                                   .allow_remote = run->config.allow_remote,
                                   .hosts = run->config.hosts,
+                                  .tls_certificate = run->config.tls_cert[0] ? run->config.tls_cert : NULL,
+                                  .tls_key = run->config.tls_key[0] ? run->config.tls_key : NULL,
+                                  .health = run->config.health,
                                   .open = run->config.open,
                                   .key_file = run->config.keys,
                                   .viewer_folder = viewer_folder(&run->config, folder, sizeof folder),
@@ -188,7 +191,7 @@ static int announce(const serve_run *run)
 {
     char address[MAX_URL], url[MAX_URL + 16], ticket[PAL_WIRE_ROLE_COUNT][PAL_TICKET_TEXT], own[MAX_URL + 128];
     make_address(run, address, sizeof address);
-    snprintf(url, sizeof url, "http://%s/", address);
+    snprintf(url, sizeof url, "http%s://%s/", run->config.tls_cert[0] ? "s" : "", address);
     for (int r = 0; r < PAL_WIRE_ROLE_COUNT; r++) pal_server_start_ticket(run->server, (pal_wire_role)r, ticket[r]);
     if (run->common.json) {
         cJSON *sessions = cJSON_CreateArray(), *tickets = cJSON_CreateObject();
@@ -254,7 +257,8 @@ static pal_err find_lcm(serve_run *run, pal_diagnostic *diag)
     pal_server_start_ticket(run->server, PAL_WIRE_ROLE_TRAINEE, ticket);
     if (setenv("PALPATE_TICKET", ticket, true)) return PAL_ERR_MEMORY;
     for (int i = 0; i < run->n; i++)
-        snprintf(run->lcm[i].server, MAX_URL, "ws://%s/ws?session=%s", address, run->scene[i]->scene.name);
+        snprintf(run->lcm[i].server, MAX_URL, "ws%s://%s/ws?session=%s", run->config.tls_cert[0] ? "s" : "", address,
+                 run->scene[i]->scene.name);
     return PAL_ERR_OK;
 }
 

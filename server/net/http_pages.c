@@ -175,20 +175,23 @@ static bool get_asset(pal_hub *hub, const char *path, pal_reply *reply)
     return true;
 }
 
-void pal_hub_get(void *user, const char *path, pal_reply *reply)
+void pal_hub_get(void *user, const char *path, bool health, pal_reply *reply)
 {
     static const struct {
         const char *path;
         void (*get)(pal_hub *hub, pal_reply *reply);
-    } pages[] = {
-        {"/healthz", get_health}, {"/readyz", get_ready}, {"/sessions", get_sessions}, {"/metrics", get_metrics}};
+        bool of_operators;
+    } pages[] = {{"/healthz", get_health, true},
+                 {"/readyz", get_ready, true},
+                 {"/metrics", get_metrics, true},
+                 {"/sessions", get_sessions, false}};
     pal_hub *hub = user;
     memset(reply, 0, sizeof *reply);
     for (size_t i = 0; i < sizeof pages / sizeof *pages; i++)
-        if (!strcmp(path, pages[i].path)) {
+        if (!strcmp(path, pages[i].path) && (pages[i].of_operators ? health || hub->health_on_main : !health)) {
             pages[i].get(hub, reply);
             return;
         }
-    if (!get_asset(hub, path, reply) && !(hub->site && pal_site_get(hub->site, path, reply)))
+    if (health || (!get_asset(hub, path, reply) && !(hub->site && pal_site_get(hub->site, path, reply))))
         reply_plain(reply, 404, "not found\n");
 }

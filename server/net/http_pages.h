@@ -3,5 +3,5 @@
 #define PAL_NET_HTTP_PAGES_H
 #include "server/net/hub_core.h"
 
-void pal_hub_get(void *hub, const char *path, pal_reply *reply); /* a pal_peer_events.get */
+void pal_hub_get(void *hub, const char *path, bool health, pal_reply *reply); /* a pal_peer_events.get */
 #endif

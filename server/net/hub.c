@@ -347,6 +347,7 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
     hub->error_m = options->error_m;
     hub->verb = options->verb ? options->verb : pal_verb_table;
     hub->n_verb = options->verb ? options->n_verb : pal_verb_count;
+    hub->health_on_main = !options->allow_remote && !(options->health && options->health[0]);
     hub->max_members = options->max_clients > 0 ? options->max_clients : PAL_HUB_CLIENTS;
     hub->max_clients = hub->max_members + PAL_UNJOINED_PLACES;
     hub->room = calloc((size_t)n_session, sizeof *hub->room);

@@ -12,6 +12,9 @@ typedef struct pal_server_options {
     int port;           /* 8090; 0: any free port, see pal_server_port                               */
     bool allow_remote;  /* other machines may connect */
     const char *hosts;  /* names by which they reach it, "a,b", beside its addresses and its own name; NULL: none */
+    const char *tls_certificate, *tls_key; /* PEM files; NULL: no TLS */
+    const char *health; /* "9090", "0.0.0.0:9090": where health and metrics are served, and nowhere else; NULL: on the
+                           main port, unless other machines may connect */
     const char *viewer_folder; /* files served at /; NULL: none                                             */
     const struct pal_transport_ops *transport; /* NULL: websockets */
     /* of the hub */

@@ -3,10 +3,10 @@
 #include "server/base/log.h"
 #include "server/net/hub_peers.h"
 #include "server/net/hub_plan.h"
+#include "server/net/transport/host_name.h"
 #include "server/net/transport/plain_text.h"
 #include "server/net/tuning.h"
 
-#include <arpa/inet.h>
 #include <string.h>
 
 /* ---- tools ---- */
@@ -114,15 +114,6 @@ static void send_hello(pal_client *c)
     pal_hub_send(c);
 }
 
-/* From this machine comes a proxy for everybody, and whoever is here can do worse than fill places */
-static bool is_loopback(const char *address)
-{
-    struct in_addr v4;
-    if (!strncmp(address, "::ffff:", 7)) address += 7;
-    return !address[0] || !strcmp(address, "::1") ||
-           (inet_pton(AF_INET, address, &v4) == 1 && ntohl(v4.s_addr) >> 24 == 127);
-}
-
 /* is there a place in the whole server for this member? */
 static bool has_place(const pal_client *c, pal_wire_role role)
 {
@@ -136,7 +127,8 @@ static bool has_place(const pal_client *c, pal_wire_role role)
         n_address += !strcmp(other->grant.address, c->grant.address);
     }
     if (role == PAL_WIRE_ROLE_INSTRUCTOR) return n < hub->max_members;
-    const bool counted = !is_loopback(c->grant.address) && !c->grant.ticket.uses && !c->grant.ticket.user;
+    /* from this machine comes a proxy for everybody, and whoever is here can do worse than fill places */
+    const bool counted = !pal_address_is_loopback(c->grant.address) && !c->grant.ticket.uses && !c->grant.ticket.user;
     return n < hub->max_members - kept && (!counted || n_address < PAL_ADDRESS_PLACES);
 }
 

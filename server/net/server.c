@@ -1,10 +1,13 @@
 /* The server puts loop, hub and transport together. */
 #include "server/net/server.h"
 
+#include "server/net/transport/host_name.h"
+#include "server/net/transport/tuning.h"
 #include "server/net/tuning.h"
 
 #include <arpa/inet.h>
 #include <sched.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -16,6 +19,7 @@ struct pal_server {
     pal_transport *transport;
     pal_server_gate *gate;
     pal_listen_address address;
+    char health_ip[64];
 };
 
 void pal_server_gate_wake(void *gate)
@@ -35,13 +39,6 @@ void pal_server_connect(pal_server *server, pal_server_gate *gate)
     pal_loop_wake(server->loop);
 }
 
-static bool is_loopback(const char *listen)
-{
-    struct in_addr v4;
-    if (!strcmp(listen, "::1")) return true;
-    return inet_pton(AF_INET, listen, &v4) == 1 && ntohl(v4.s_addr) >> 24 == 127;
-}
-
 /* an address alone: names of hosts and ports behind a colon are none */
 static bool is_address(const char *listen)
 {
@@ -56,12 +53,35 @@ static pal_err choose_address(const pal_server_options *options, pal_listen_addr
     if (!is_address(listen))
         return PAL_REFUSE(diag, "--listen %.80s: wanted an IP address alone, as 127.0.0.1; a port is given with --port",
                           listen);
-    if (!options->allow_remote && !is_loopback(listen))
+    if (!options->allow_remote && !pal_address_is_loopback(listen))
         return PAL_REFUSE(diag,
-                          "listening on %s lets other machines in, without password or encryption: add "
-                          "--allow-remote if that is meant",
+                          "listening on %s lets other machines in: add --allow-remote if that is meant, and a "
+                          "certificate with --tls-cert and --tls-key",
                           listen);
-    *out = (pal_listen_address){listen, options->port, options->allow_remote, options->hosts};
+    if (!options->tls_certificate != !options->tls_key)
+        return PAL_REFUSE(diag, "--tls-cert and --tls-key belong together: %s is missing",
+                          options->tls_key ? "the certificate" : "the key");
+    *out = (pal_listen_address){.ip = listen,
+                                .port = options->port,
+                                .remote = options->allow_remote,
+                                .hosts = options->hosts,
+                                .tls_certificate = options->tls_certificate,
+                                .tls_key = options->tls_key};
+    return PAL_ERR_OK;
+}
+
+/* "PORT" of the loopback address, "ADDRESS:PORT" or "[ADDRESS]:PORT" */
+static pal_err choose_health_address(pal_server *s, const char *health, pal_diagnostic *diag)
+{
+    const char *colon = strrchr(health, ':'), *port = colon ? colon + 1 : health;
+    size_t n = colon ? (size_t)(colon - health) : 0;
+    const bool bracket = n > 2 && health[0] == '[' && health[n - 1] == ']';
+    int n_port = 0;
+    snprintf(s->health_ip, sizeof s->health_ip, "%.*s", (int)(bracket ? n - 2 : n), health + bracket);
+    if (!colon) snprintf(s->health_ip, sizeof s->health_ip, "127.0.0.1");
+    if (sscanf(port, "%5d%n", &s->address.health_port, &n_port) != 1 || port[n_port] || !is_address(s->health_ip))
+        return PAL_REFUSE(diag, "--health %.80s: wanted a port, or an address and a port as 127.0.0.1:9090", health);
+    s->address.health_ip = s->health_ip;
     return PAL_ERR_OK;
 }
 
@@ -70,9 +90,12 @@ static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_
 {
     pal_peer_events events;
     PAL_TRY(choose_address(options, &s->address, diag));
+    if (options->health && options->health[0]) PAL_TRY(choose_health_address(s, options->health, diag));
     if (options->viewer_folder) PAL_TRY(pal_site_open(options->viewer_folder, diag, &s->site));
-    /* besides the members: connections that do not join, page loads, and what lws needs itself */
-    int max_socket = (options->max_clients > 0 ? options->max_clients : PAL_HUB_CLIENTS) + PAL_UNJOINED_PLACES + 128;
+    /* besides the members: sockets kept for the health listener, connections that do not join, page loads, and what lws
+     * needs itself */
+    const int max_socket = s->address.max_socket = (options->max_clients > 0 ? options->max_clients : PAL_HUB_CLIENTS) +
+                                                   PAL_UNJOINED_PLACES + 128 + PAL_HEALTH_SOCKETS;
     PAL_TRY(pal_loop_create(s->ops->sockets, max_socket, pal_session_clock(session[0]), diag, &s->loop));
     PAL_TRY(pal_hub_create(s->loop, options, s->site, session, n_session, diag, &s->hub));
     pal_hub_events(s->hub, &events);
@@ -116,6 +139,11 @@ void pal_server_start_ticket(const pal_server *server, pal_wire_role role, char 
 int pal_server_port(const pal_server *server)
 {
     return server->address.port;
+}
+
+int pal_server_health_port(const pal_server *server)
+{
+    return server->address.health_ip ? server->address.health_port : -1;
 }
 
 void pal_server_close(pal_server *server)

@@ -28,7 +28,8 @@ void pal_server_stop(pal_server *server);   /* [any], also from a signal-handlin
 /* a ticket of this server for any session and tool, as long as it runs */
 void pal_server_start_ticket(const pal_server *server, pal_wire_role role, char text[PAL_TICKET_TEXT]);
 int pal_server_port(const pal_server *server);
-void pal_server_close(pal_server *server); /* [load] */
+int pal_server_health_port(const pal_server *server); /* -1: no listener of its own */
+void pal_server_close(pal_server *server);            /* [load] */
 
 /* For a transport without sockets: the transport, and one turn of the loop instead of pal_server_run. The calling
  * thread is [net]. */

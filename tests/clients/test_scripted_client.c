@@ -16,11 +16,13 @@ static void addresses_are_understood_or_refused_by_name(void)
     static const pal_link_events events = {NULL, NULL, NULL, NULL};
     pal_link_loop *loop = NULL;
     REQUIRE(pal_link_loop_create(&loop) == PAL_ERR_OK);
-    const char *const good[] = {"ws://127.0.0.1:8090/ws", "http://localhost", "ws://[::1]:1/ws?session=x", "ws://h/"};
+    const char *const good[] = {
+        "ws://127.0.0.1:8090/ws",          "http://localhost", "ws://[::1]:1/ws?session=x", "ws://h/", "wss://h/ws",
+        "https://h:8443/?session=x#ticket"};
     const char *const bad[] = {
-        "",          "wss://h/ws",        "ws://", "ws://:80", "ws://h:0", "ws://h:70000", "ws://h:1x/ws",
+        "",          "ftp://h/ws",        "ws://", "ws://:80", "ws://h:0", "ws://h:70000", "ws://h:1x/ws",
         "ws://[::1", "file:///etc/passwd"};
-    for (int i = 0; i < 4; i++) {
+    for (int i = 0; i < 6; i++) {
         pal_link *link = NULL;
         CHECK_INT(pal_link_open(loop, &(pal_link_options){.url = good[i], .events = &events}, NULL, &link), PAL_ERR_OK);
         pal_link_close(link);

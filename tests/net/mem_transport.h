@@ -111,7 +111,7 @@ static inline const pal_packet *pal_mem_receive(pal_mem_peer *peer)
 /* response to GET (assets); the caller drops the body */
 static inline void pal_mem_get(pal_transport *transport, const char *path, pal_reply *reply)
 {
-    transport->events.get(transport->events.user, path, reply);
+    transport->events.get(transport->events.user, path, false, reply);
 }
 
 /* websocket close code; 0: open */

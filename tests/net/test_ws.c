@@ -71,6 +71,15 @@ static int joined(const char *join)
     return fd;
 }
 
+/* what took a socket out of the time limits of libwebsockets: an upgrade to HTTP/2, also as a second request, and a
+ * tunnel */
+#define H2C                                                                                                            \
+    "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: Upgrade, HTTP2-Settings\r\nUpgrade: h2c\r\n"                     \
+    "HTTP2-Settings: AAMAAABkAAQCAAAAAAIAAAAA\r\n\r\n"
+static const char *const held_by[] = {H2C, "GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" H2C,
+                                      "CONNECT /metrics HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"};
+enum { HELD = sizeof held_by / sizeof *held_by };
+
 static bool still_serves(void)
 {
     return get("/healthz", "", NULL, 0, NULL) == 200;
@@ -139,7 +148,9 @@ static void deflate_is_never_agreed_on(void)
 
 static void other_upgrades_leave_the_server_well(void)
 {
-    static const char *const wanted[] = {"h2c", "TLS/1.0", "websocket, h2c", "", "nonsense"};
+    static const char *const wanted[] = {"h2c", "H2C", "TLS/1.0", "websocket, h2c", "", "nonsense"};
+    /* 403: the library's own, for what it does not know; an empty one is no upgrade */
+    static const int status[] = {400, 400, 403, 403, 200, 403};
     for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
         char request[512];
         snprintf(request, sizeof request,
@@ -148,11 +159,26 @@ static void other_upgrades_leave_the_server_well(void)
                  port, wanted[i]);
         int fd = raw_connect(port);
         raw_send_text(fd, request);
-        raw_head(fd, head, sizeof head);
+        CHECK_INT(raw_head(fd, head, sizeof head), status[i]);
+        if (status[i] != 200) CHECK(raw_ended(fd));
         raw_send_text(fd, "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n");
         CHECK(still_serves());
         close(fd);
     }
+    /* as a second request, and a tunnel */
+    char body[8];
+    int fd = raw_connect(port);
+    raw_send_text(fd, held_by[1]);
+    CHECK_INT(raw_head(fd, head, sizeof head), 200);
+    CHECK_INT(raw_get(fd, body, 3), 3);
+    CHECK_INT(raw_head(fd, head, sizeof head), 400);
+    CHECK(raw_ended(fd));
+    close(fd);
+    fd = raw_connect(port);
+    raw_send_text(fd, held_by[2]);
+    CHECK_INT(raw_head(fd, head, sizeof head), 400);
+    CHECK(raw_ended(fd));
+    close(fd);
 }
 
 static void files_have_type_tag_and_policy(void)
@@ -360,14 +386,6 @@ static void flood_closes_the_flooder_alone(void)
 enum { CROWD = 150 };
 static int crowd[CROWD];
 
-/* what takes a socket out of the time limits of libwebsockets: an upgrade to HTTP/2, also as a second request, and a
- * tunnel */
-#define H2C                                                                                                            \
-    "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: Upgrade, HTTP2-Settings\r\nUpgrade: h2c\r\n"                     \
-    "HTTP2-Settings: AAMAAABkAAQCAAAAAAIAAAAA\r\n\r\n"
-static const char *const held_by[] = {H2C, "GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" H2C,
-                                      "CONNECT /metrics HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"};
-enum { HELD = sizeof held_by / sizeof *held_by };
 static int held[HELD];
 
 static void half_open_connections_keep_nobody_out(void)
@@ -451,7 +469,7 @@ static void other_machines_come_by_address_or_by_a_listed_name(void)
                 {":80", 403}};
     for (size_t i = 0; i < sizeof kind / sizeof *kind; i++) {
         char request[512];
-        snprintf(request, sizeof request, "GET /healthz HTTP/1.1\r\nHost: %s\r\n\r\n", kind[i].host);
+        snprintf(request, sizeof request, "GET / HTTP/1.1\r\nHost: %s\r\n\r\n", kind[i].host);
         const int status = raw_request(port, request, head, sizeof head, NULL, 0, NULL);
         check_count++;
         if (status != kind[i].status) CHECK_FAIL("%s: status %d, wanted %d", kind[i].host, status, kind[i].status);
@@ -469,6 +487,39 @@ static void other_machines_come_by_address_or_by_a_listed_name(void)
                       "Sec-WebSocket-Version: 13\r\n" PALPATE "\r\n");
     CHECK_INT(raw_head(fd, head, sizeof head), 403);
     close(fd);
+}
+
+/* every socket of the main port is held: it turns others away, and health and metrics answer on their own port, where
+ * nothing else does, also for a name that no browser may come by */
+static void health_answers_when_every_socket_is_held(void)
+{
+    static int held_here[1000];
+    char request[128], body[64] = "";
+    size_t n = 0;
+    const int health = pal_server_health_port(server);
+    REQUIRE(health > 0);
+    CHECK_INT(get("/healthz", "", NULL, 0, NULL), 404);
+    CHECK_INT(get("/metrics", "", NULL, 0, NULL), 404);
+    int taken = 0;
+    for (; taken < 1000; taken++) {
+        held_here[taken] = raw_connect(port);
+        raw_send_text(held_here[taken], "GET / HTTP/1.1\r\nHost: 127.");
+        /* one that is turned away ends at once; those held do not for 5 s */
+        struct timeval soon = {0, 20000};
+        char byte;
+        setsockopt(held_here[taken], SOL_SOCKET, SO_RCVTIMEO, &soon, sizeof soon);
+        if (taken > 200 && recv(held_here[taken], &byte, 1, 0) <= 0 && errno != EAGAIN) break;
+    }
+    CHECK_LE(200, taken);
+    CHECK_LE(taken, 999);
+    snprintf(request, sizeof request, "GET /healthz HTTP/1.1\r\nHost: 10.1.2.3:%d\r\n\r\n", health);
+    for (int i = 0; i < 3; i++) {
+        CHECK_INT(raw_request(health, request, head, sizeof head, body, sizeof body - 1, &n), 200);
+        CHECK(n == 3 && !memcmp(body, "ok\n", 3));
+    }
+    snprintf(request, sizeof request, "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
+    CHECK_INT(raw_request(health, request, head, sizeof head, NULL, 0, NULL), 404);
+    for (int i = 0; i <= taken && i < 1000; i++) close(held_here[i]);
 }
 
 static void goodbye_is_said_to_everybody(void)
@@ -523,6 +574,9 @@ int main(void)
     end();
     begin((pal_server_options){.allow_remote = true, .hosts = "organ.example,station"});
     RUN(other_machines_come_by_address_or_by_a_listed_name);
+    end();
+    begin((pal_server_options){.max_clients = 100, .health = "0"});
+    RUN(health_answers_when_every_socket_is_held);
     end();
     for (size_t i = 0; i < 5; i++) {
         char path[300];

@@ -61,7 +61,7 @@ static pal_err open_context(pal_loop *loop, int max_socket, pal_diagnostic *diag
     struct lws_context_creation_info info;
     memset(&info, 0, sizeof info);
     lws_set_log_level(LLL_ERR | LLL_WARN, lws_line);
-    info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS;
+    info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS | LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
     info.port = CONTEXT_PORT_NO_LISTEN_SERVER;
     info.user = loop;
     info.fd_limit_per_thread = (unsigned)max_socket;

@@ -40,8 +40,9 @@ typedef struct pal_peer_events {
     bool (*waiting)(void *user, const pal_peer *peer); /* would next return a message? */
     pal_packet *(*next)(void *user, pal_peer *peer);   /* message to send now, owned by the transport; NULL: none */
     void (*closed)(void *user, pal_peer *peer);        /* once for every opened */
-    /* GET path: fills *reply; never serves data of other members */
-    void (*get)(void *user, const char *path, pal_reply *reply);
+    /* GET path: fills *reply; never serves data of other members; health: asked on the listener of health and metrics
+     */
+    void (*get)(void *user, const char *path, bool health, pal_reply *reply);
     void *user;
 } pal_peer_events;
 
@@ -51,6 +52,10 @@ typedef struct pal_listen_address {
     int port;          /* 0: any, and open sets the one chosen */
     bool remote;       /* other machines may connect: Host may also be an IP address, this machine's name, or */
     const char *hosts; /* one of these, "a,b"; NULL: none */
+    int max_socket;    /* of the loop */
+    const char *tls_certificate, *tls_key; /* PEM files; NULL: no TLS */
+    const char *health_ip;                 /* of a listener for health and metrics alone, without TLS; NULL: none */
+    int health_port;                       /* 0: any, and open sets the one chosen */
 } pal_listen_address;
 
 struct pal_transport_ops {

@@ -1,40 +1,46 @@
-/* ws://: websockets and HTTP on one port, by libwebsockets 4.1.6 (Debian).
+/* ws://: websockets and HTTP on one port, by libwebsockets 4.1.6 (Debian), with TLS where there is a certificate.
  *
  * Measured facts it keeps to: tx_packet_size 1 MiB; no extensions, ever (permessage-deflate can abort
  * the process); one lws_write per writable callback; protocols[0] takes connections without a subprotocol unchecked, so
- * they are denied there; HTTP_CONFIRM_UPGRADE is not handled. Its time limits do not hold for an upgrade to HTTP/2 nor
- * for CONNECT, so every socket has a deadline of its own until it is a websocket. The listening socket is our own and
- * every accepted socket is adopted: so a port in use has a clear sentence, and socket options are set before the first
- * byte. What is received: at most 4096 bytes a message. Browsers: Origin must be this host, and Host a loopback name;
- * where other machines may connect, also an IP address, this machine's name or one that is listed. So no page reaches
- * the server by a foreign name that resolves here (DNS rebinding). */
+ * they are denied there. It would also make HTTP/2 of an upgrade to h2c and a raw connection of CONNECT: both are
+ * answered 400 where it asks. Every socket has a deadline of its own until it is a websocket. What is received: at most
+ * 4096 bytes a message. Health and metrics can have a listener of their own, for which some sockets are kept. */
 #include "protocol/ticket.h"
+#include "server/base/clock.h"
 #include "server/base/log.h"
+#include "server/net/transport/host_name.h"
+#include "server/net/transport/listener.h"
+#include "server/net/transport/request_rate.h"
+#include "server/net/transport/tls_files.h"
 #include "server/net/transport/transport.h"
+#include "server/net/transport/tuning.h"
 
-#include <arpa/inet.h>
-#include <errno.h>
-#include <fcntl.h>
 #include <libwebsockets.h>
-#include <netinet/tcp.h>
+#include <openssl/ssl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
-enum { CHUNK = 64 << 10, HEADERS = 4096, SEND_QUEUE = 16 << 10, UNACKED_MS = 15000, DROP_S = 2, BACKLOG = 128 };
-/* us; longer than lws keeps an idle connection (keepalive_timeout); three times that while a file is read (test_ws) */
-static const lws_usec_t DEADLINE_US = 10000000;
+enum { CHUNK = 64 << 10, HEADERS = 4096, DROP_S = 2 };
 _Static_assert((int)PAL_PACKET_HEADROOM >= LWS_PRE, "a packet has room for the websocket header");
+
+/* a listening socket, and how many it has accepted that are open */
+typedef struct pal_listening {
+    pal_listener listener;
+    bool health, adopted; /* adopted: lws closes the listener's descriptor with the loop */
+    int n_socket;
+} pal_listening;
 
 struct pal_transport {
     pal_peer_events events;
     struct lws_vhost *vhost;
-    int listen_fd, spare_fd; /* spare: given up to turn a caller away when descriptors run out */
-    bool remote, adopted;    /* adopted: lws closes listen_fd with the loop */
-    char *hosts;             /* names by which it is reached, "a,b"        */
+    pal_listening on[2]; /* the main one, and that of health and metrics */
+    bool remote;
+    int max_socket;
+    char *hosts; /* names by which it is reached, "a,b"        */
+    pal_request_rate rate;
     uint8_t chunk[LWS_PRE + CHUNK];
 };
 
@@ -42,6 +48,8 @@ struct pal_transport {
 typedef struct request {
     pal_packet *body;
     size_t at;
+    bool waits; /* for its turn */
+    char path[512];
 } request;
 typedef struct connection {
     pal_peer peer; /* first: the transport's record is found from it */
@@ -51,6 +59,12 @@ typedef struct connection {
     uint8_t bytes[PAL_CONTROL_IN_MAX];
 } connection;
 
+/* of a socket that has been adopted; NULL before */
+static pal_listening *listening_of(struct lws *wsi)
+{
+    return lws_get_opaque_user_data(wsi);
+}
+
 static pal_transport *transport_of(struct lws *wsi)
 {
     return lws_vhost_user(lws_get_vhost(wsi));
@@ -58,57 +72,23 @@ static pal_transport *transport_of(struct lws *wsi)
 
 /* ---- who may come ---- */
 
-/* the name of "name", "name:port", "[address]" or "[address]:port", without brackets; false: it is none of them */
-static bool name_of_host(const char *host, char *name, size_t cap)
-{
-    const bool v6 = *host == '[';
-    const char *from = host + v6, *end = from + strcspn(from, v6 ? "]" : ":"), *port = end + (v6 && *end);
-    if (end == from || (size_t)(end - from) >= cap || (v6 && !*end)) return false;
-    memcpy(name, from, (size_t)(end - from));
-    name[end - from] = 0;
-    return *port == 0 || (*port == ':' && port[1] && !port[1 + strspn(port + 1, "0123456789")]);
-}
-
-/* is it one of "a,b,c"? */
-static bool is_listed(const char *list, const char *name)
-{
-    const size_t n = strlen(name);
-    for (const char *at = list; at && *at; at += strcspn(at, ","), at += *at == ',')
-        if (strcspn(at, ",") == n && !strncasecmp(at, name, n)) return true;
-    return false;
-}
-
-/* A page of a stranger can have any name lead here, but no address and not this machine's own name */
-static bool name_allowed(const pal_transport *t, const char *name)
-{
-    struct in_addr v4;
-    struct in6_addr v6;
-    char own[256] = "";
-    const bool is_v4 = inet_pton(AF_INET, name, &v4) == 1;
-    if (!strcasecmp(name, "localhost") || !strcmp(name, "::1") || (is_v4 && ntohl(v4.s_addr) >> 24 == 127)) return true;
-    if (!t->remote) return false;
-    if (is_v4 || inet_pton(AF_INET6, name, &v6) == 1 || is_listed(t->hosts, name)) return true;
-    return !gethostname(own, sizeof own - 1) && own[0] && !strcasecmp(name, own);
-}
-
-/* copies the host of the request; false: there is none, it has other than harmless characters, or it is not allowed */
+/* copies the host of the request; false: there is none, or it is not allowed */
 static bool host_allowed(struct lws *wsi, char *host, int cap)
 {
-    static const char harmless[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-_:[]";
-    char name[256];
-    if (lws_hdr_copy(wsi, host, cap, WSI_TOKEN_HOST) <= 0 || host[strspn(host, harmless)]) return false;
-    return name_of_host(host, name, sizeof name) && name_allowed(transport_of(wsi), name);
+    const pal_listening *on = listening_of(wsi);
+    if (lws_hdr_copy(wsi, host, cap, WSI_TOKEN_HOST) <= 0) return false;
+    return pal_host_allowed(host, transport_of(wsi)->remote || on->health, transport_of(wsi)->hosts);
 }
 
-/* native clients send no Origin; a page's must be this very host */
+/* native clients send no Origin; a page's must be this very host, and browsers say that it is no other site's */
 static bool origin_allowed(struct lws *wsi, const char *host)
 {
-    char origin[256];
-    int n = lws_hdr_total_length(wsi, WSI_TOKEN_ORIGIN);
-    if (n == 0) return true;
-    if (lws_hdr_copy(wsi, origin, sizeof origin, WSI_TOKEN_ORIGIN) <= 0) return false;
-    const char *name = !strncmp(origin, "http://", 7) ? origin + 7 : !strncmp(origin, "https://", 8) ? origin + 8 : "";
-    return !strcasecmp(name, host);
+    char origin[256], site[32];
+    if (lws_hdr_custom_copy(wsi, site, sizeof site, "sec-fetch-site:", 15) > 0 && strcmp(site, "same-origin") &&
+        strcmp(site, "none"))
+        return false;
+    if (lws_hdr_total_length(wsi, WSI_TOKEN_ORIGIN) == 0) return true;
+    return lws_hdr_copy(wsi, origin, sizeof origin, WSI_TOKEN_ORIGIN) > 0 && pal_origin_allowed(origin, host);
 }
 
 static int deny(struct lws *wsi, unsigned status)
@@ -127,7 +107,6 @@ static int deny_host(struct lws *wsi)
 static int filter_upgrade(struct lws *wsi)
 {
     char host[256], path[64];
-    if (lws_get_network_wsi(wsi) != wsi) return deny(wsi, 403);
     if (!host_allowed(wsi, host, sizeof host)) return deny_host(wsi);
     if (lws_hdr_copy(wsi, path, sizeof path, WSI_TOKEN_GET_URI) <= 0 || strcmp(path, "/ws")) return deny(wsi, 403);
     return origin_allowed(wsi, host) ? 0 : deny(wsi, 403);
@@ -181,11 +160,10 @@ static int begin_reply(struct lws *wsi, request *r, const char *path)
     pal_reply reply;
     char host[256];
     bool head = lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
-    if (lws_get_network_wsi(wsi) != wsi) return -1;
-    lws_set_timer_usecs(wsi, DEADLINE_US);
+    lws_set_timer_usecs(wsi, PAL_SOCKET_DEADLINE_US);
     if (!host_allowed(wsi, host, sizeof host)) return deny_host(wsi);
     if (!head && lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0) return deny(wsi, 405);
-    t->events.get(t->events.user, path, &reply);
+    t->events.get(t->events.user, path, listening_of(wsi)->health, &reply);
     size_t n_body = reply.body ? reply.body->n_byte : 0;
     bool same = reply.status == 200 && has_already(wsi, reply.etag);
     if (same) reply.status = 304;
@@ -203,6 +181,31 @@ static int begin_reply(struct lws *wsi, request *r, const char *path)
     return 0;
 }
 
+/* a request answers at once, or when its address may make another */
+static int request_came(struct lws *wsi, request *r, const char *path)
+{
+    pal_transport *t = transport_of(wsi);
+    char address[46] = "";
+    lws_get_peer_simple(wsi, address, sizeof address);
+    const uint64_t wait_ns = pal_request_rate_take(&t->rate, address, pal_clock_ns());
+    if (wait_ns == UINT64_MAX) return deny(wsi, 429);
+    if (wait_ns == 0) return begin_reply(wsi, r, path);
+    if (strlen(path) >= sizeof r->path) return deny(wsi, 414);
+    strcpy(r->path, path);
+    r->waits = true;
+    lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, 30);
+    lws_set_timer_usecs(wsi, (lws_usec_t)(wait_ns / 1000) + 1);
+    return 0;
+}
+
+/* a turn that has come, or the end of a socket's time */
+static int timer_fired(struct lws *wsi, request *r)
+{
+    if (!r || !r->waits) return -1;
+    r->waits = false;
+    return begin_reply(wsi, r, r->path);
+}
+
 static int continue_reply(struct lws *wsi, request *r)
 {
     pal_transport *t = transport_of(wsi);
@@ -218,9 +221,30 @@ static int continue_reply(struct lws *wsi, request *r)
         return complete(wsi);
     }
     lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, 30);
-    lws_set_timer_usecs(wsi, 3 * DEADLINE_US);
+    lws_set_timer_usecs(wsi, 3 * PAL_SOCKET_DEADLINE_US);
     lws_callback_on_writable(wsi);
     return 0;
+}
+
+/* Any upgrade but that to a websocket ends here: the HTTP/2 of this libwebsockets is old. For an unknown one it has
+ * answered 403 itself and freed the headers, and would read them again if this returned 0 */
+static int confirm_upgrade(struct lws *wsi)
+{
+    char upgrade[16] = "";
+    if (lws_hdr_total_length(wsi, WSI_TOKEN_UPGRADE) <= 0) return -1;
+    if (lws_hdr_copy(wsi, upgrade, sizeof upgrade, WSI_TOKEN_UPGRADE) > 0 && !strcasecmp(upgrade, "websocket"))
+        return 0;
+    return deny(wsi, 400);
+}
+
+/* libwebsockets makes a raw connection of CONNECT */
+static int refuse_connect(struct lws *wsi)
+{
+    static const char answer[] = "HTTP/1.1 400 Bad Request\r\nconnection: close\r\ncontent-length: 0\r\n\r\n";
+    unsigned char buffer[LWS_PRE + sizeof answer];
+    memcpy(buffer + LWS_PRE, answer, sizeof answer);
+    (void)lws_write(wsi, buffer + LWS_PRE, sizeof answer - 1, LWS_WRITE_RAW);
+    return -1;
 }
 
 static int http_callback(struct lws *wsi, enum lws_callback_reasons reason, void *own, void *in, size_t n_byte)
@@ -231,11 +255,18 @@ static int http_callback(struct lws *wsi, enum lws_callback_reasons reason, void
     case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
         return deny(wsi, 403); /* no subprotocol, or none we know */
     case LWS_CALLBACK_HTTP:
-        return begin_reply(wsi, r, in);
+        return request_came(wsi, r, in);
+    case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:
+        return confirm_upgrade(wsi);
+    case LWS_CALLBACK_RAW_ADOPT:
+        return refuse_connect(wsi);
     case LWS_CALLBACK_HTTP_WRITEABLE:
         return continue_reply(wsi, r);
     case LWS_CALLBACK_TIMER:
-        return -1;
+        return timer_fired(wsi, r);
+    case LWS_CALLBACK_WSI_DESTROY:
+        if (listening_of(wsi)) listening_of(wsi)->n_socket--;
+        return 0;
     case LWS_CALLBACK_CLOSED_HTTP:
     case LWS_CALLBACK_HTTP_DROP_PROTOCOL:
         if (r) pal_packet_replace(&r->body, NULL);
@@ -340,33 +371,23 @@ static int ws_callback(struct lws *wsi, enum lws_callback_reasons reason, void *
     }
 }
 
-/* ---- the listening socket ---- */
+/* ---- listening ---- */
 
-static void tune(int fd)
+static void accept_all(pal_transport *t, pal_listening *on)
 {
-    int on = 1, low = SEND_QUEUE, unacked_ms = UNACKED_MS;
-    (void)setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-    /* what is not on the wire yet can still be replaced by something newer */
-    (void)setsockopt(fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &low, sizeof low);
-    (void)setsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &unacked_ms, sizeof unacked_ms);
-}
-
-static void accept_all(pal_transport *t)
-{
-    for (int i = 0; i < BACKLOG; i++) {
-        int fd = accept4(t->listen_fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
-        if (fd >= 0) {
-            tune(fd);
-            struct lws *wsi = lws_adopt_socket_vhost(t->vhost, fd); /* closes it when it cannot */
-            if (wsi) lws_set_timer_usecs(wsi, DEADLINE_US);
+    const lws_adoption_type kind = LWS_ADOPT_SOCKET | LWS_ADOPT_HTTP | (on->health ? 0 : LWS_ADOPT_ALLOW_SSL);
+    for (int fd; (fd = pal_listener_accept(&on->listener)) >= 0;) {
+        /* sockets that the health listener keeps for itself */
+        if (!on->health && on->n_socket >= t->max_socket - PAL_HEALTH_SOCKETS) {
+            close(fd);
             continue;
         }
-        if (errno == EINTR || errno == ECONNABORTED) continue;
-        if ((errno != EMFILE && errno != ENFILE) || t->spare_fd < 0) return;
-        close(t->spare_fd);
-        fd = accept4(t->listen_fd, NULL, NULL, SOCK_CLOEXEC);
-        if (fd >= 0) close(fd);
-        t->spare_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
+        const lws_sock_file_fd_type socket = {.sockfd = fd};
+        struct lws *wsi = lws_adopt_descriptor_vhost(t->vhost, kind, socket, NULL, NULL); /* closes it when it cannot */
+        if (!wsi) continue;
+        lws_set_opaque_user_data(wsi, on);
+        on->n_socket++;
+        lws_set_timer_usecs(wsi, PAL_SOCKET_DEADLINE_US);
     }
 }
 
@@ -375,7 +396,7 @@ static int listen_callback(struct lws *wsi, enum lws_callback_reasons reason, vo
     (void)own, (void)in, (void)n_byte;
     /* a protocol of ours, not a subprotocol to ask for */
     if (reason == LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION) return deny(wsi, 403);
-    if (reason == LWS_CALLBACK_RAW_RX_FILE) accept_all(transport_of(wsi));
+    if (reason == LWS_CALLBACK_RAW_RX_FILE) accept_all(transport_of(wsi), listening_of(wsi));
     return 0;
 }
 
@@ -384,80 +405,69 @@ static const struct lws_protocols protocols[] = {
     {PAL_PROTOCOL_NAME, ws_callback, sizeof(connection), PAL_CONTROL_IN_MAX, 0, NULL, 1 << 20},
     {"palpate-listen", listen_callback, 0, 0, 0, NULL, 0},
     {NULL, NULL, 0, 0, 0, NULL, 0}};
-
 static const lws_retry_bo_t alive = {.secs_since_valid_ping = 20, .secs_since_valid_hangup = 40};
 
-static pal_err open_socket(pal_transport *t, pal_listen_address *from, pal_diagnostic *diag)
+static void ws_close(pal_transport *t)
 {
-    const bool is_v6 = strchr(from->ip, ':') != NULL;
-    union {
-        struct sockaddr any;
-        struct sockaddr_in v4;
-        struct sockaddr_in6 v6;
-    } address = {.v6 = {.sin6_family = is_v6 ? AF_INET6 : AF_INET}};
-    socklen_t n = is_v6 ? sizeof address.v6 : sizeof address.v4;
-    in_port_t *port = is_v6 ? &address.v6.sin6_port : &address.v4.sin_port;
-    void *ip = is_v6 ? (void *)&address.v6.sin6_addr : (void *)&address.v4.sin_addr;
-    char name[INET6_ADDRSTRLEN + 16];
-    int on = 1;
-    snprintf(name, sizeof name, is_v6 ? "[%s]:%d" : "%s:%d", from->ip, from->port);
-    if (from->port < 0 || from->port > UINT16_MAX || inet_pton(address.any.sa_family, from->ip, ip) != 1)
-        return PAL_REFUSE(diag, "%s is not an address to listen on", name);
-    *port = htons((uint16_t)from->port);
-    t->remote = from->remote;
-    t->hosts = strdup(from->hosts ? from->hosts : "");
-    if (!t->hosts) return PAL_ERR_MEMORY;
-    t->spare_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
-    t->listen_fd = socket(address.any.sa_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-    if (t->listen_fd < 0) return pal_diagnostic_set(diag, PAL_ERR_IO, "no socket: %s", strerror(errno));
-    (void)setsockopt(t->listen_fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    if (bind(t->listen_fd, &address.any, n) || listen(t->listen_fd, BACKLOG)) {
-        if (errno == EADDRINUSE)
-            return PAL_REFUSE(
-                diag, "%s is in use by another program; choose another port with --port (0: any free one)", name);
-        return PAL_REFUSE(diag, "cannot listen on %s: %s", name, strerror(errno));
+    if (!t) return;
+    for (int k = 0; k < 2; k++) {
+        /* lws has closed those that it adopted, with the loop */
+        if (t->on[k].adopted) t->on[k].listener.fd = -1;
+        pal_listener_close(&t->on[k].listener);
     }
-    if (getsockname(t->listen_fd, &address.any, &n)) return PAL_ERR_IO;
-    from->port = ntohs(*port);
+    free(t->hosts);
+    free(t);
+}
+
+static pal_err listen_on(pal_transport *t, pal_listening *on, const char *ip, int *port, pal_diagnostic *diag)
+{
+    PAL_TRY(pal_listener_open(&on->listener, ip, port, diag));
+    const lws_sock_file_fd_type fd = {.filefd = on->listener.fd};
+    struct lws *wsi = lws_adopt_descriptor_vhost(t->vhost, LWS_ADOPT_RAW_FILE_DESC, fd, "palpate-listen", NULL);
+    if (!wsi) return pal_diagnostic_set(diag, PAL_ERR_IO, "the network context could not listen");
+    lws_set_opaque_user_data(wsi, on);
+    on->n_socket++;
+    on->adopted = true;
     return PAL_ERR_OK;
 }
 
-static void ws_close(pal_transport *transport)
+static pal_err open_vhost(pal_loop *loop, pal_transport *t, const pal_listen_address *address, pal_diagnostic *diag)
 {
-    if (!transport) return;
-    if (!transport->adopted && transport->listen_fd >= 0) close(transport->listen_fd);
-    if (transport->spare_fd >= 0) close(transport->spare_fd);
-    free(transport->hosts);
-    free(transport);
+    struct lws_context_creation_info info = {.port = CONTEXT_PORT_NO_LISTEN_SERVER,
+                                             .vhost_name = "palpate",
+                                             .server_string = "palpate",
+                                             .protocols = protocols,
+                                             .user = t,
+                                             .timeout_secs = 5,
+                                             .timeout_secs_ah_idle = 5,
+                                             .keepalive_timeout = 7,
+                                             .retry_and_idle_policy = &alive};
+    if (address->tls_certificate) {
+        info.options = LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
+        info.ssl_cert_filepath = address->tls_certificate;
+        info.ssl_private_key_filepath = address->tls_key;
+        info.ssl_options_set = SSL_OP_NO_TLSv1 | SSL_OP_NO_TLSv1_1;
+        info.alpn = "http/1.1";
+        PAL_TRY(pal_tls_files_check(address->tls_certificate, address->tls_key, diag));
+    }
+    t->vhost = lws_create_vhost(pal_loop_context(loop), &info);
+    return t->vhost ? PAL_ERR_OK : pal_diagnostic_set(diag, PAL_ERR_IO, "the network context has no host");
 }
 
 static pal_err ws_open(pal_loop *loop, pal_listen_address *address, const pal_peer_events *events, pal_diagnostic *diag,
                        pal_transport **out)
 {
-    struct lws_context_creation_info info;
     pal_transport *t = calloc(1, sizeof *t);
     if (!t) return PAL_ERR_MEMORY;
     t->events = *events;
-    t->listen_fd = t->spare_fd = -1;
-    pal_err err = open_socket(t, address, diag);
+    t->remote = address->remote;
+    t->max_socket = address->max_socket;
+    t->hosts = strdup(address->hosts ? address->hosts : "");
+    for (int k = 0; k < 2; k++) t->on[k] = (pal_listening){.listener = {-1, -1}, .health = k == 1};
+    pal_err err = t->hosts ? open_vhost(loop, t, address, diag) : PAL_ERR_MEMORY;
+    if (!err) err = listen_on(t, &t->on[0], address->ip, &address->port, diag);
+    if (!err && address->health_ip) err = listen_on(t, &t->on[1], address->health_ip, &address->health_port, diag);
     if (err) return ws_close(t), err;
-    memset(&info, 0, sizeof info);
-    info.port = CONTEXT_PORT_NO_LISTEN_SERVER;
-    info.vhost_name = "palpate";
-    info.server_string = "palpate";
-    info.protocols = protocols;
-    info.user = t;
-    info.timeout_secs = 5;
-    info.timeout_secs_ah_idle = 5;
-    info.keepalive_timeout = 7;
-    info.retry_and_idle_policy = &alive;
-    t->vhost = lws_create_vhost(pal_loop_context(loop), &info);
-    lws_sock_file_fd_type fd = {.filefd = t->listen_fd};
-    if (!t->vhost || !lws_adopt_descriptor_vhost(t->vhost, LWS_ADOPT_RAW_FILE_DESC, fd, "palpate-listen", NULL)) {
-        ws_close(t);
-        return pal_diagnostic_set(diag, PAL_ERR_IO, "the network context could not listen");
-    }
-    t->adopted = true;
     *out = t;
     return PAL_ERR_OK;
 }
