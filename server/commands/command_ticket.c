@@ -1,7 +1,7 @@
 /* `palpate ticket`: makes keys and tickets. The ticket is printed alone, so that scripts can take it. */
 #include "server/cli/report.h"
 #include "server/commands/commands.h"
-#include "server/net/ticket_keys.h"
+#include "server/net/admission/ticket_keys.h"
 
 #include <limits.h>
 #include <math.h>

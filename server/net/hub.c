@@ -13,6 +13,7 @@
 #include "server/net/hub_peers.h"
 #include "server/net/hub_plan.h"
 #include "server/net/hub_verb.h"
+#include "server/net/hub_watch.h"
 #include "server/net/transport/plain_text.h"
 #include "server/net/tuning.h"
 
@@ -270,7 +271,7 @@ static void hub_wake(void *user)
         next = pal_hub_report_news(room, now);
         if (next && (!due || next < due)) due = next;
     }
-    pal_hub_jobs_update(hub);
+    for (int r = 0; r < hub->n_room; r++) pal_hub_jobs_update(&hub->room[r]);
     if (due) pal_loop_set_due(hub->loop, due);
 }
 
@@ -314,6 +315,7 @@ static void hub_tick(void *user)
         pal_stream_measure(hub->room[r].stream, now);
         pal_hub_update_subscriptions(&hub->room[r]);
         pal_hub_count_unobserved(&hub->room[r]);
+        pal_hub_watch_pace(&hub->room[r]);
     }
     for (int i = 0; i < hub->max_clients; i++) {
         pal_client *c = &hub->client[i];
@@ -328,7 +330,7 @@ static void hub_tick(void *user)
             continue;
         }
         judge_tier(c, now);
-        pal_hub_component_result(c);
+        pal_hub_world_answer(c);
         c->status_due = true;
         pal_hub_estimates_due(c);
         c->peer->ops->ready(c->peer);
@@ -364,7 +366,6 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
         room->step_s = scene->step_s;
         pal_members_init(&room->members, scene->n_tool);
         if (options->open) room->members.rights = pal_rights_named("") & ~(1u << PAL_RIGHT_COMPONENT);
-        for (int b = 0; b < scene->n_body; b++) room->material[b] = scene->body[b].material;
         if (options->study && options->study[i].n > 0) room->study = options->study[i];
         err = pal_stream_open(session[i], options->error_m, diag, &room->stream);
         if (!err) hub->n_room++;
@@ -378,9 +379,9 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
 void pal_hub_destroy(pal_hub *hub)
 {
     if (!hub) return;
-    pal_hub_jobs_end(hub);
     for (int i = 0; i < hub->n_room; i++) {
         pal_hub_room *room = &hub->room[i];
+        pal_hub_jobs_end(room);
         pal_stream_close(room->stream);
         if (room->own) pal_session_close(room->session);
         pal_packet_drop(room->members_message);

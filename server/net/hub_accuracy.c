@@ -85,6 +85,12 @@ static double point_of(const pal_hub_room *room, int body, const pal_configurati
     return best < 0 ? NAN : (double)best;
 }
 
+double pal_hub_study_ms(const pal_hub_room *room, int body, const pal_configuration *of)
+{
+    const double point = point_of(room, body, of);
+    return isnan(point) ? NAN : room->study.configuration[(int)point].ms;
+}
+
 static double error_of(const pal_hub_room *room, double point)
 {
     return isnan(point) ? NAN : room->study.configuration[(int)point].error_m;

@@ -12,4 +12,6 @@ pal_packet *pal_hub_next_estimate(pal_client *client); /* NULL: none is due */
  * Both are NaN for a body whose estimate is older than PAL_HUB_ESTIMATE_OLD_S of its steps, or that has woken since. */
 void pal_hub_shown_errors(const pal_hub_room *room, int body, int point, const pal_configuration *to, double *now_m,
                           double *then_m);
+/* time of a step in the room's study of the point that is a configuration, ms; NaN: none is. [net] */
+double pal_hub_study_ms(const pal_hub_room *room, int body, const pal_configuration *of);
 #endif

@@ -1,7 +1,7 @@
 /* Structs of the hub: clients, rooms, counters. Shared by all files of the hub. Thread: [net]. */
 #ifndef PAL_NET_HUB_CORE_H
 #define PAL_NET_HUB_CORE_H
-#include "server/net/admission.h"
+#include "server/net/admission/admission.h"
 #include "server/net/stream.h"
 #include "server/net/transport/credit.h"
 #include "server/net/transport/site.h"
@@ -51,8 +51,11 @@ typedef struct pal_client {
     uint64_t n_byte, n_cycle, n_skipped;
     uint64_t status_byte, status_ns;                      /* at the last status */
     uint64_t tier_cycle, tier_skipped, tier_ns, clean_ns; /* window of the tier control */
-    /* a command about a component without an answer: deadline, 0: none; refusals of the session before it */
-    uint64_t component_until_ns, component_refused;
+    /* a command that the world may refuse, without an answer yet: deadline, 0: none; refusals of the session before it;
+     * its verb */
+    uint64_t answer_until_ns, answer_refused;
+    char answer_verb[32];
+    uint64_t jobs_until_ns; /* when the time that its edits took is made up for */
     uint64_t pose_error_ns; /* last error about poses */
     uint64_t waits_ns;      /* since when it waits for any tool; 0: it does not */
 } pal_client;
@@ -84,6 +87,25 @@ typedef struct pal_hub_order {
     uint64_t at_ns;
 } pal_hub_order;
 
+/* how to take back the last order that may have made the session slow; kind NONE: there is none */
+typedef struct pal_hub_undo {
+    enum { PAL_UNDO_NONE, PAL_UNDO_COMMAND, PAL_UNDO_SWITCH, PAL_UNDO_EDIT } kind;
+    pal_command command;             /* COMMAND: the former material or state of a component */
+    pal_configuration configuration; /* SWITCH: the former one */
+    int body, member;
+    uint64_t at_ns; /* when it took effect */
+    char verb[32], name[PAL_MEMBER_NAME];
+} pal_hub_undo;
+
+/* what keep_real_time has given up (hub_watch.c) */
+enum { PAL_QUALITY_LEVELS = 4 };
+typedef struct pal_hub_quality {
+    int n_lowered;
+    pal_configuration was[PAL_QUALITY_LEVELS]; /* configurations before each change, the oldest first */
+    double cost[PAL_QUALITY_LEVELS];           /* cost of each over that of the cheaper one that replaced it */
+    uint64_t slow_ns, spare_ns;                /* since when the session is slow, or has time to spare; 0: it is not */
+} pal_hub_quality;
+
 /* one session, as the hub sees it */
 typedef struct pal_hub_room {
     pal_hub *hub;
@@ -104,7 +126,10 @@ typedef struct pal_hub_room {
     double moved_m[PAL_TOOL_MAX][3]; /* where each tool was, and its buttons, when it last moved, at moved_ns */
     uint32_t moved_buttons[PAL_TOOL_MAX];
     uint64_t moved_ns[PAL_TOOL_MAX];
-    pal_material material[PAL_BODY_MAX]; /* as last requested */
+    struct pal_hub_jobs *jobs; /* NULL until a command needs it */
+    pal_hub_undo undo;
+    pal_hub_quality quality;
+    uint64_t slow_ns; /* since when the session is much slower than real time; 0: it is not */
     /* steps without output for lack of observers; tick and OUTPUT runs at the last count */
     uint64_t n_unobserved, seen_tick, seen_output;
     bool was_unobserved;                   /* no observers at the last count */
@@ -124,13 +149,11 @@ typedef struct pal_hub_count {
     uint64_t n_pose_ignored, n_pose_refused, n_malformed, n_flood, n_stalled, n_overflow;
 } pal_hub_count;
 
-typedef struct pal_hub_jobs pal_hub_jobs;
 typedef struct pal_verb pal_verb;
 
 struct pal_hub {
     pal_loop *loop;
     pal_session **session; /* the caller's array [n_room] */
-    pal_hub_jobs *jobs;    /* NULL until a command needs it */
     const pal_verb *verb;  /* known commands [n_verb], borrowed */
     int n_verb;
     double error_m;

@@ -5,12 +5,15 @@
 #include "server/base/thread.h"
 #include "server/net/hub_peers.h"
 #include "server/net/hub_plan.h"
+#include "server/net/hub_undo.h"
+#include "server/net/tuning.h"
+#include "server/solve/preflight.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { PENDING_MAX = 16, RETIRED_MAX = 8 };
+enum { RETIRED_MAX = 8 };
 
 typedef struct pending_job {
     pal_hub_room *room;
@@ -18,11 +21,15 @@ typedef struct pending_job {
     uint64_t asked_ns;
     const pal_job_type *type;
     pal_wire_command command;
+    bool own; /* the server's: in the name of a member, who gets no answer */
+    pal_configuration to;
+    int quality;
 } pending_job;
 
+typedef struct pal_hub_jobs pal_hub_jobs;
 struct pal_hub_jobs {
-    pal_loop *loop;                   /* woken when a job is done */
-    pending_job pending[PENDING_MAX]; /* oldest first */
+    pal_loop *loop;                        /* woken when a job is done */
+    pending_job pending[PAL_JOBS_PENDING]; /* oldest first */
     int n_pending;
     pending_job current; /* in progress, no longer pending */
     bool busy;           /* a job is in progress or done */
@@ -36,14 +43,28 @@ struct pal_hub_jobs {
     bool leaving;
 };
 
+static pal_err check_cost(pal_job *job, const pal_scene *scene)
+{
+    const double step_ms = 1e3 * scene->step_s;
+    if (job->may_be_slow) return PAL_ERR_OK;
+    const double ms = pal_step_cost_ms(scene, pal_session_held_world(job->made.session));
+    if (!(ms > step_ms) || ms <= PAL_DEARER * job->now_ms) return PAL_ERR_OK;
+    return pal_diagnostic_set(&job->diag, PAL_ERR_BUDGET,
+                              "a step would take about %.3g ms of its %.3g ms; an instructor may order it", ms,
+                              step_ms);
+}
+
 static void make(pal_job *job)
 {
     const pal_scene *scene = NULL;
+    const uint64_t before = pal_clock_thread_ns();
     job->err = job->type->prepare(job, &scene);
     if (!job->err) job->err = pal_session_open_after(job->session, scene, &job->diag, &job->made.session);
+    if (!job->err) job->err = check_cost(job, scene);
     if (!job->err) job->err = pal_stream_open(job->made.session, job->error_m, &job->diag, &job->made.stream);
     if (!job->err) job->type->transfer(job);
     job->made_ns = pal_clock_now_ns(pal_session_clock(job->session));
+    job->work_ns = pal_clock_thread_ns() - before;
 }
 
 static void free_products(const pal_job_products *p)
@@ -137,9 +158,9 @@ static pal_hub_jobs *begin_jobs(pal_loop *loop)
     return NULL;
 }
 
-void pal_hub_jobs_end(pal_hub *hub)
+void pal_hub_jobs_end(pal_hub_room *room)
 {
-    pal_hub_jobs *s = hub->jobs;
+    pal_hub_jobs *s = room->jobs;
     if (!s) return;
     pthread_mutex_lock(&s->lock);
     s->leaving = true;
@@ -150,7 +171,7 @@ void pal_hub_jobs_end(pal_hub *hub)
     pthread_mutex_destroy(&s->lock);
     pthread_cond_destroy(&s->changed);
     free(s);
-    hub->jobs = NULL;
+    room->jobs = NULL;
 }
 
 /* NULL: has left */
@@ -209,7 +230,7 @@ static bool commit(pal_hub_room *room, pal_job *job)
     keep_assets(room, retired.stream);
     room->hub->session[room - room->hub->room] = NULL;
     room->own = true;
-    retire(room->hub->jobs, &retired);
+    retire(room->jobs, &retired);
     return true;
 }
 
@@ -226,13 +247,38 @@ static void send_topology(pal_hub_room *room)
     }
 }
 
+/* what a member's job has changed can be taken back; what the server's has, is counted */
+static void account(pal_hub_room *room, pal_client *c, const pal_job *job)
+{
+    room->quality.n_lowered += job->quality;
+    if (!c) return;
+    pal_hub_undo *undo = pal_hub_undo_begin(c, job->verb);
+    undo->kind = job->type->switches ? PAL_UNDO_SWITCH : PAL_UNDO_EDIT;
+    undo->body = job->body;
+    undo->configuration = job->before;
+    room->quality.n_lowered = 0; /* somebody has chosen */
+}
+
+/* the time that a member's jobs may not take for some while */
+static void charge(pal_client *c, const pal_job *job)
+{
+    const uint64_t now = pal_loop_now_ns(c->hub->loop);
+    if (c->jobs_until_ns < now) c->jobs_until_ns = now;
+    c->jobs_until_ns += 2 * job->work_ns;
+}
+
 static void finish(pal_hub_jobs *s, pal_job *job)
 {
     pal_hub_room *room = s->current.room;
-    pal_client *c = requester(&s->current);
+    pal_client *c = s->current.own ? NULL : requester(&s->current);
+    if (c) charge(c, job);
     if (!job->err && commit(room, job)) {
         send_topology(room);
+        account(room, c, job);
         if (c) job->type->answer(c, job);
+    } else if (!c && s->current.own) {
+        pal_hub_notice(room, "refused", "%s: %s", job->verb,
+                       job->diag.text[0] ? job->diag.text : pal_err_text(job->err));
     } else if (c) {
         const char *reason = job->diag.text[0] ? job->diag.text : pal_err_text(job->err);
         bool named = !strncmp(reason, job->verb, strlen(job->verb)); /* cell edits name the verb */
@@ -263,7 +309,11 @@ static void begin_next(pal_hub_jobs *s)
         pal_job job = {.type = s->current.type,
                        .session = c->room->session,
                        .error_m = c->hub->error_m,
-                       .asked_ns = s->current.asked_ns};
+                       .asked_ns = s->current.asked_ns,
+                       .now_ms = c->room->stream->step_ms,
+                       .may_be_slow = s->current.own || pal_hub_is_instructor(c),
+                       .quality = s->current.quality,
+                       .configuration = s->current.to};
         memcpy(job.verb, s->current.command.verb, sizeof job.verb);
         bool good = job.type->read(c, &s->current.command, &job);
         if (good && !(job.scene = scene_now(c->room)))
@@ -275,21 +325,58 @@ static void begin_next(pal_hub_jobs *s)
     }
 }
 
+/* NULL: out of memory */
+static pal_hub_jobs *jobs_of(pal_hub_room *room)
+{
+    if (!room->jobs) room->jobs = begin_jobs(room->hub->loop);
+    return room->jobs;
+}
+
 bool pal_hub_jobs_enqueue(pal_client *c, const pal_job_type *type, const pal_wire_command *command)
 {
-    if (!c->hub->jobs) c->hub->jobs = begin_jobs(c->hub->loop);
-    pal_hub_jobs *s = c->hub->jobs;
+    pal_hub_jobs *s = jobs_of(c->room);
+    const uint64_t now = pal_loop_now_ns(c->hub->loop);
+    int n_own = 0;
     if (!s) return pal_hub_refuse(c, "refused", "%s: %s", command->verb, pal_err_text(PAL_ERR_MEMORY));
-    if (s->n_pending == PENDING_MAX)
-        return pal_hub_refuse(c, "busy", "%s: %d commands wait already", command->verb, PENDING_MAX);
-    s->pending[s->n_pending++] = (pending_job){c->room, c->id, pal_loop_now_ns(c->hub->loop), type, *command};
+    for (int k = 0; k < s->n_pending; k++) n_own += s->pending[k].member == c->id;
+    if (n_own >= PAL_JOBS_OF_MEMBER || s->n_pending == PAL_JOBS_PENDING)
+        return pal_hub_refuse(c, "busy", "%s: %d commands wait already", command->verb, n_own ? n_own : s->n_pending);
+    if (c->jobs_until_ns > now + PAL_JOBS_TIME_NS && !pal_hub_is_instructor(c))
+        return pal_hub_refuse(c, "busy", "%s: your commands have taken much time: wait %.0f s", command->verb,
+                              1e-9 * (double)(c->jobs_until_ns - now - PAL_JOBS_TIME_NS) + 1);
+    s->pending[s->n_pending++] =
+        (pending_job){.room = c->room, .member = c->id, .asked_ns = now, .type = type, .command = *command};
     begin_next(s);
     return true;
 }
 
-void pal_hub_jobs_update(pal_hub *hub)
+bool pal_hub_jobs_enqueue_own(pal_hub_room *room, const pal_job_type *type, const pal_wire_command *command,
+                              const pal_configuration *to, int quality)
 {
-    pal_hub_jobs *s = hub->jobs;
+    pal_hub_jobs *s = jobs_of(room);
+    const pal_client *any = pal_hub_next_member(room, NULL);
+    if (!s || !any || s->n_pending == PAL_JOBS_PENDING) return false;
+    pending_job *job = &s->pending[s->n_pending++];
+    *job = (pending_job){.room = room,
+                         .member = any->id,
+                         .asked_ns = pal_loop_now_ns(room->hub->loop),
+                         .type = type,
+                         .command = *command,
+                         .own = true,
+                         .quality = quality};
+    if (to) job->to = *to;
+    begin_next(s);
+    return true;
+}
+
+bool pal_hub_jobs_busy(const pal_hub_room *room)
+{
+    return room->jobs && (room->jobs->busy || room->jobs->n_pending > 0);
+}
+
+void pal_hub_jobs_update(pal_hub_room *room)
+{
+    pal_hub_jobs *s = room->jobs;
     pal_job job;
     if (!s) return;
     if (collect(s, &job)) finish(s, &job);

@@ -1,8 +1,11 @@
-/* Commands that produce another scene. They wait in a queue; a pending command is parsed when its turn comes, so that
- * it applies to the result of its predecessors. While the session runs, a background thread prepares the scene, world
- * and stream that the command leads to, which is slow and allocates. It then stops that session and transfers its
- * state, while other sessions and the loop continue, and frees what was replaced. One job at a time. Thread: [net]
- * unless noted. */
+/* Commands that produce another scene. They wait in a queue of their session; a pending command is parsed when its turn
+ * comes, so that it applies to the result of its predecessors. While the session runs, a background thread prepares the
+ * scene, world and stream that the command leads to, which is slow and allocates. It then stops that session and
+ * transfers its state, while other sessions and the loop continue, and frees what was replaced. One job of a session at
+ * a time.
+ *
+ * What a trainee asks for is costed: a step of the next world must fit into its time, or take no longer than now. Each
+ * member's jobs may take half of the time of the thread. Thread: [net] unless noted. */
 #ifndef PAL_NET_HUB_JOBS_H
 #define PAL_NET_HUB_JOBS_H
 #include "server/net/hub_core.h"
@@ -28,6 +31,7 @@ typedef struct pal_job_type {
     void (*commit)(pal_hub_body_edits *edits, pal_job *job, pal_job_products *retired);
     void (*answer)(pal_client *client, const pal_job *job); /* [net] */
     bool keeps_brushes;                                     /* brushes continue in the next session */
+    bool switches;                                          /* a switch of configuration, else an edit */
 } pal_job_type;
 
 /* One job and its result. The background thread borrows sculptor, session and was; nobody changes or closes them
@@ -40,15 +44,19 @@ struct pal_job {
     double error_m;
     char verb[32];
     uint64_t asked_ns, made_ns;
+    uint64_t work_ns; /* processor time of its making */
+    double now_ms;    /* measured time of a step now */
+    bool may_be_slow; /* asked for by an instructor or the server: not costed */
+    int quality;      /* of pal_hub_switch_to; 0: a member's or none */
     /* edit */
     pal_sculptor *sculptor;
     pal_sculpt command;
     double *point_m; /* points of the command, or NULL; owned */
     /* configuration switch */
-    pal_configuration configuration;
-    const pal_body_def *was;          /* the body before its first switch */
-    pal_body_def *base;               /* a copy of it when this is the first switch, else NULL; owned */
-    double error_now_m, error_then_m; /* as displayed to clients; NaN: none */
+    pal_configuration configuration, before; /* before: of the running session */
+    const pal_body_def *was;                 /* the body before its first switch */
+    pal_body_def *base;                      /* a copy of it when this is the first switch, else NULL; owned */
+    double error_now_m, error_then_m;        /* as displayed to clients; NaN: none */
     pal_transfer_report report;
     /* result; on err there is none, and diag gives the reason */
     pal_err err;
@@ -57,8 +65,13 @@ struct pal_job {
     int n_brush_ended;
 };
 
-/* appends a command; false: the queue is full or out of memory, an error was sent */
+/* appends a command; false: the queue is full, the member's time is used up, or out of memory: an error was sent */
 bool pal_hub_jobs_enqueue(pal_client *client, const pal_job_type *type, const pal_wire_command *command);
-void pal_hub_jobs_update(pal_hub *hub); /* commits and answers the finished job, and starts the next command */
-void pal_hub_jobs_end(pal_hub *hub);    /* waits for the job in progress and frees it; the thread ends */
+/* the same for the server itself, in the name of any member, who gets no answer; false: not now. to: the configuration
+ * of a switch; NULL: none */
+bool pal_hub_jobs_enqueue_own(pal_hub_room *room, const pal_job_type *type, const pal_wire_command *command,
+                              const pal_configuration *to, int quality);
+bool pal_hub_jobs_busy(const pal_hub_room *room); /* a job is in progress or waits */
+void pal_hub_jobs_update(pal_hub_room *room); /* commits and answers the finished job, and starts the next command */
+void pal_hub_jobs_end(pal_hub_room *room);    /* waits for the job in progress and frees it; the thread ends */
 #endif

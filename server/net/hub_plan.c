@@ -3,9 +3,11 @@
 #include "server/net/hub_plan.h"
 
 #include "server/net/hub_peers.h"
+#include "server/net/hub_undo.h"
 #include "server/net/transport/plain_text.h"
 #include "server/net/tuning.h"
 
+#include <stdio.h>
 #include <string.h>
 
 void pal_hub_put_plan(const pal_hub_room *room, pal_wire_plan *out)
@@ -80,20 +82,31 @@ void pal_hub_count_unobserved(pal_hub_room *room)
     room->was_unobserved = room->members.n_member == 0;
 }
 
-void pal_hub_component_result(pal_client *c)
+void pal_hub_await_answer(pal_client *c, const char *verb)
+{
+    const pal_frame *f = c->room->stream->frame;
+    /* the world answers between two steps, with a count of refusals and the last diagnostic */
+    c->answer_until_ns = pal_loop_now_ns(c->hub->loop) + PAL_ANSWER_NS;
+    c->answer_refused = f ? f->n_refused : 0;
+    snprintf(c->answer_verb, sizeof c->answer_verb, "%s", verb);
+}
+
+void pal_hub_world_answer(pal_client *c)
 {
     const pal_frame *f = c->room->stream->frame;
     pal_diagnostic diag = {""};
-    if (!c->component_until_ns || !f) return;
-    bool refused = f->n_refused > c->component_refused;
+    if (!c->answer_until_ns || !f) return;
+    bool refused = f->n_refused > c->answer_refused;
     if (refused) pal_session_last_diagnostic(c->room->session, &diag);
-    if (diag.text[0]) pal_hub_refuse(c, "refused", "component: %s", diag.text);
-    if (refused || pal_loop_now_ns(c->hub->loop) > c->component_until_ns) c->component_until_ns = 0;
+    if (diag.text[0]) {
+        pal_hub_refuse(c, "refused", "%s: %s", c->answer_verb, diag.text);
+        c->room->undo.kind = PAL_UNDO_NONE; /* nothing was done */
+    }
+    if (refused || pal_loop_now_ns(c->hub->loop) > c->answer_until_ns) c->answer_until_ns = 0;
 }
 
 bool pal_hub_run_component(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
-    const pal_frame *f = c->room->stream->frame;
     double part = pal_hub_arg(command, "part", -1);
     pal_command order = {.kind = PAL_COMMAND_COMPONENT, .wanted = pal_hub_arg(command, "enabled", 0) != 0};
     if (!(part >= 0 && part < c->room->stream->n_part))
@@ -102,8 +115,9 @@ bool pal_hub_run_component(pal_client *c, const pal_verb *verb, const pal_wire_c
         return pal_hub_refuse(c, "target", "there is no component %s", command->target);
     order.body = (int)part;
     strcpy(order.component, command->target);
-    /* the world answers between two steps, with a count of refusals and the last diagnostic */
-    c->component_until_ns = pal_loop_now_ns(c->hub->loop) + PAL_ANSWER_NS;
-    c->component_refused = f ? f->n_refused : 0;
-    return pal_hub_session_command(c, verb->name, &order);
+    if (!pal_hub_session_command(c, verb->name, &order)) return false;
+    pal_hub_await_answer(c, verb->name);
+    order.wanted = !order.wanted;
+    pal_hub_undo_by_command(c, verb->name, &order);
+    return true;
 }

@@ -45,3 +45,8 @@ bool pal_hub_may(const pal_client *c, pal_right right)
     if (right == PAL_RIGHT_TOOL) return m->tool >= 0;
     return trainee && (m->rights & 1u << right);
 }
+
+bool pal_hub_is_instructor(const pal_client *c)
+{
+    return pal_members_find(&c->room->members, c->id)->role == PAL_MEMBER_INSTRUCTOR;
+}

@@ -24,6 +24,8 @@ void pal_rights_text(uint32_t rights, char *text, size_t cap);
 uint32_t pal_rights_named(const char *name);
 /* may the client do this now? */
 bool pal_hub_may(const pal_client *client, pal_right right);
+/* instructors may order what is slower than real time */
+bool pal_hub_is_instructor(const pal_client *client);
 /* who may, in words: "instructors, and trainees with the right sculpt" */
 extern const char *const pal_right_text[PAL_RIGHT_COUNT];
 #endif

@@ -1,5 +1,6 @@
 /* Verbs for sculpting (protocol/README.md, "Sculpting"): edits go through hub_jobs.c, brushes and probes act at
  * once. */
+#include "server/net/hub_switch.h"
 #include "server/net/hub_verb.h"
 
 #include "server/base/vec3.h"
@@ -186,6 +187,13 @@ static const pal_job_type edit_job = {.read = read_edit,
                                       .transfer = transfer_edit,
                                       .commit = commit_edit,
                                       .answer = answer_edit};
+
+bool pal_hub_undo_edit(pal_hub_room *room, int body)
+{
+    pal_wire_command command = {.verb = "undo"};
+    snprintf(command.target, sizeof command.target, "%s", pal_session_scene(room->session)->body[body].name);
+    return pal_hub_jobs_enqueue_own(room, &edit_job, &command, NULL, 0);
+}
 
 bool pal_hub_run_edit(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {

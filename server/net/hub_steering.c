@@ -3,6 +3,8 @@
 
 #include "server/net/hub_news.h"
 #include "server/net/hub_peers.h"
+#include "server/net/hub_plan.h"
+#include "server/net/hub_undo.h"
 
 bool pal_hub_run_steering(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
@@ -31,13 +33,18 @@ bool pal_hub_run_material(pal_client *c, const pal_verb *verb, const pal_wire_co
 {
     int body = pal_hub_find_body(c, command->target, 0);
     if (body < 0) return false;
-    pal_material m = c->room->material[body];
+    pal_material before, m;
+    pal_session_material(c->room->session, body, &before);
+    m = before;
     m.young_Pa = pal_hub_arg(command, "young_Pa", m.young_Pa);
     m.poisson = pal_hub_arg(command, "poisson", m.poisson);
     m.density_kg_m3 = pal_hub_arg(command, "density_kg_m3", m.density_kg_m3);
     m.damping_1_s = pal_hub_arg(command, "damping_1_s", m.damping_1_s);
     pal_command order = {.kind = PAL_COMMAND_MATERIAL, .body = body, .material = m};
+    if (!pal_hub_is_instructor(c)) order.max_step_ms = 1e3 * pal_session_scene(c->room->session)->step_s;
     if (!pal_hub_session_command(c, verb->name, &order)) return false;
-    c->room->material[body] = m;
+    pal_hub_await_answer(c, verb->name);
+    order.material = before, order.max_step_ms = 0;
+    pal_hub_undo_by_command(c, verb->name, &order);
     return true;
 }

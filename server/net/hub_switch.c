@@ -1,5 +1,7 @@
 /* Verbs that switch the configuration of a body (protocol/README.md, "Configurations") to a point of its study or to
  * other parameters. hub_jobs.c prepares and commits. */
+#include "server/net/hub_switch.h"
+
 #include "server/net/hub_verb.h"
 
 #include "server/net/hub_accuracy.h"
@@ -10,6 +12,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* no verb of a client: the configuration stands in the job */
+#define OWN_VERB "switch"
 
 /* finds a point of the room's study; false: an error was sent */
 static bool read_point(pal_client *c, int body, const pal_wire_command *command, int *point, pal_configuration *to)
@@ -46,21 +51,28 @@ static bool read_parameters(pal_client *c, int body, const pal_wire_command *com
     return true;
 }
 
+/* first switch: keeps the body as it is, so that the switch can be reverted */
+static bool keep_base(pal_client *c, const pal_wire_command *command, pal_job *job)
+{
+    job->was = c->room->edits[job->body].base;
+    if (job->was) return true;
+    job->was = job->base = malloc(sizeof *job->base);
+    if (job->base) *job->base = pal_session_scene(c->room->session)->body[job->body];
+    return job->base || pal_hub_refuse(c, "refused", "%s: %s", command->verb, pal_err_text(PAL_ERR_MEMORY));
+}
+
 static bool read_switch(pal_client *c, const pal_wire_command *command, pal_job *job)
 {
     int point = -1;
     job->body = pal_hub_find_body(c, command->target, c->room->study.configuration ? c->room->study.body : 0);
     if (job->body < 0) return false;
+    pal_configuration_of(pal_session_scene(c->room->session), job->body, &job->before);
+    if (!strcmp(command->verb, OWN_VERB)) return keep_base(c, command, job);
     if (!isnan(pal_hub_arg(command, "index", NAN)) ? !read_point(c, job->body, command, &point, &job->configuration)
                                                    : !read_parameters(c, job->body, command, &job->configuration))
         return false;
     pal_hub_shown_errors(c->room, job->body, point, &job->configuration, &job->error_now_m, &job->error_then_m);
-    job->was = c->room->edits[job->body].base;
-    if (job->was) return true;
-    /* first switch: keeps the body as it is, so that the switch can be reverted */
-    job->was = job->base = malloc(sizeof *job->base);
-    if (job->base) *job->base = pal_session_scene(c->room->session)->body[job->body];
-    return job->base || pal_hub_refuse(c, "refused", "%s: %s", command->verb, pal_err_text(PAL_ERR_MEMORY));
+    return keep_base(c, command, job);
 }
 
 static pal_err prepare_switch(pal_job *job, const pal_scene **scene)
@@ -145,7 +157,15 @@ static const pal_job_type switch_job = {.read = read_switch,
                                         .transfer = transfer_switch,
                                         .commit = commit_switch,
                                         .answer = answer_switch,
-                                        .keeps_brushes = true};
+                                        .keeps_brushes = true,
+                                        .switches = true};
+
+bool pal_hub_switch_to(pal_hub_room *room, int body, const pal_configuration *to, int quality)
+{
+    pal_wire_command command = {.verb = OWN_VERB};
+    snprintf(command.target, sizeof command.target, "%s", pal_session_scene(room->session)->body[body].name);
+    return pal_hub_jobs_enqueue_own(room, &switch_job, &command, to, quality);
+}
 
 bool pal_hub_run_switch(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {

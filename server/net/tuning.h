@@ -27,9 +27,6 @@
  * loads (test_hub) */
 #define PAL_CONTROL_1_S     20
 #define PAL_CONTROL_AT_ONCE 40
-/* ns: a member whose connection has ended may return with its ticket for so long: a station restarts (test_admission)
- */
-#define PAL_RETURN_NS 60000000000u
 /* places that only instructors may take, but at most a quarter of all (test_hub) */
 #define PAL_INSTRUCTOR_PLACES 4
 /* members from one address of another machine without a ticket made for them (test_hub) */
@@ -59,4 +56,25 @@
 #define PAL_POSITIONS_IN_LENGTH 3000
 /* simulated s awake after which an estimate does not bound a switch any more (test_switch_bound) */
 #define PAL_HUB_ESTIMATE_OLD_S 1.0
+/* commands that produce another scene: pending of a session and of a member, who clicks faster than they are made
+ * (test_sculpt_hub); ns of the thread's time that a member may be ahead of its half (test_cost_hub) */
+#define PAL_JOBS_PENDING   8
+#define PAL_JOBS_OF_MEMBER 4
+#define PAL_JOBS_TIME_NS   5000000000u
+/* a trainee's command may make a step that is too long anyway this much longer: what is cheaper is always allowed, and
+ * foreseen times are to a fifth (test_cost_hub) */
+#define PAL_DEARER 1.1
+/* slowdown above which, for so many ns, the last order is taken back; ns within which it must have been given
+ * (test_cost_hub) */
+#define PAL_SLOW_MAX 2.0
+#define PAL_SLOW_NS  3000000000u
+#define PAL_BLAME_NS 10000000000u
+/* keep_real_time: slowdown above which, for so many ns, quality falls; cost of the next configuration over the present
+ * one, at most; share of a step that the dearer one may take for quality to rise after so many ns, long enough that it
+ * does not oscillate (test_cost_hub) */
+#define PAL_SLOW_MIN         1.1
+#define PAL_QUALITY_SLOW_NS  5000000000u
+#define PAL_CHEAPER          0.8
+#define PAL_SPARE            0.7
+#define PAL_QUALITY_SPARE_NS 20000000000u
 #endif

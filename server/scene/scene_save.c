@@ -112,6 +112,7 @@ static char *scene_text(const pal_scene *scene)
                            {"step_s", pal_json_exact(scene->step_s)}, {"up", pal_json_exact_list(scene->up, 3)},
                            {"gravity_m_s2", pal_json_exact(scene->gravity_m_s2)},
                            {"max_substep", pal_json_exact(scene->max_substep)}, {"bodies", bodies}, {"tools", tools});
+    if (scene->keep_real_time) cJSON_AddTrueToObject(root, "keep_real_time");
     char *text = cJSON_Print(root);
     cJSON_Delete(root);
     return text;

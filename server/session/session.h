@@ -47,6 +47,7 @@ typedef struct pal_command {
     int slot;
     pal_brush brush;
     char component[PAL_NAME];
+    double max_step_ms; /* MATERIAL: refused when a step would take longer, by what sub-steps take now; 0: any */
 } pal_command;
 
 typedef struct pal_session_options {
@@ -68,6 +69,8 @@ pal_err pal_session_open(const pal_scene *scene, const pal_session_options *opti
  * while no other thread closes `before` */
 pal_err pal_session_open_after(const pal_session *before, const pal_scene *scene, pal_diagnostic *diag,
                                pal_session **out);
+/* the world of a session that was opened with hold and has not started. [job] */
+pal_world *pal_session_held_world(pal_session *session);
 /* Replaces the running session `before` with `next`, which was opened with hold, in two phases.
  *
  * transfer_begin stops the thread of before between two steps and transfers subscriptions, disabled components and the

@@ -78,6 +78,7 @@ struct pal_session {
     uint64_t step;                 /* taken since open; resets do not count */
     uint64_t n_late;               /* steps that began late */
     uint64_t work_ns;              /* processor time of the last step */
+    double substep_ns;             /* smoothed processor time of a sub-step while no body sleeps; 0: unknown */
     uint64_t transferred_ns;       /* after a transfer: when the predecessor was asked to stop */
     uint64_t stopped_ns, pause_ns; /* when the predecessor had stopped, and the longest time that neither ran; for the
                                       thread that opens and transfers */

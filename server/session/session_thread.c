@@ -158,6 +158,22 @@ static const pal_input_kind record_of[PAL_COMMAND_COUNT] = {[PAL_COMMAND_RESET] 
                                                             [PAL_COMMAND_BRUSH] = PAL_INPUT_BRUSH,
                                                             [PAL_COMMAND_COMPONENT] = PAL_INPUT_COMPONENT};
 
+/* Has a material made the step longer than the command allows? Then the former one comes back, which is recorded as the
+ * input that it is, so that a replay makes the same steps */
+static pal_err check_cost(pal_session *s, const pal_command *command, int n_before, pal_input_record *record,
+                          pal_diagnostic *diag)
+{
+    const int n_sub = pal_world_rest_substeps(s->world);
+    const double ms = 1e-6 * s->substep_ns * n_sub;
+    if (!(command->max_step_ms > 0) || n_sub <= n_before || ms <= command->max_step_ms) return PAL_ERR_OK;
+    pal_input_log_put(s->log, record);
+    record->material = s->material[command->body];
+    PAL_TRY(pal_input_apply(s->world, s->scene, record, diag));
+    pal_input_log_put(s->log, record);
+    return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "a step would take %.3g ms of its %.3g ms, with %d sub-steps", ms,
+                              1e3 * s->scene->step_s, n_sub);
+}
+
 /* records an accepted input, counts a refused one */
 static void apply(pal_session *s, const pal_command *command)
 {
@@ -170,7 +186,9 @@ static void apply(pal_session *s, const pal_command *command)
                                .brush = command->brush,
                                .wanted = command->wanted};
     memcpy(record.component, command->component, sizeof record.component);
+    const int n_sub = pal_world_rest_substeps(s->world);
     pal_err err = pal_input_apply(s->world, s->scene, &record, &diag);
+    if (!err && command->kind == PAL_COMMAND_MATERIAL) err = check_cost(s, command, n_sub, &record, &diag);
     if (err)
         count_refusal(s);
     else
@@ -233,6 +251,14 @@ static void report_error(pal_session *s, pal_err err)
     put_diagnostic(s, &diag);
 }
 
+static void time_substep(pal_session *s)
+{
+    for (int b = 0; b < pal_world_body_count(s->world); b++)
+        if (pal_world_body(s->world, b)->asleep || pal_world_body(s->world, b)->frozen) return;
+    const double ns = (double)s->work_ns / pal_world_substeps(s->world);
+    s->substep_ns += s->substep_ns > 0 ? PAL_SUBSTEP_SHARE * (ns - s->substep_ns) : ns;
+}
+
 static void step(pal_session *s)
 {
     if (s->n_marks == 0) mark_pace(s, session_now_ns(s));
@@ -240,6 +266,7 @@ static void step(pal_session *s)
     pal_err err = pal_world_step(s->world, s->scene->step_s);
     pal_world_remove_idle(s->world);
     s->work_ns = pal_clock_thread_ns() - before;
+    time_substep(s);
     s->end_ns = session_now_ns(s);
     s->step++;
     mark_pace(s, s->end_ns);
@@ -413,6 +440,11 @@ void pal_session_close(pal_session *s)
         (void)pal_input_log_close(s->log, s->step, pal_world_hash(s->world)); /* it tells what fails */
     }
     release(s);
+}
+
+pal_world *pal_session_held_world(pal_session *s)
+{
+    return s->world;
 }
 
 /* ---- functions for any thread ---- */

@@ -8,6 +8,9 @@
 #define PAL_POSE_REACH 100
 /* fraction of a step: a step is late when it begins so long after its due time (test_session) */
 #define PAL_LATE_PART 0.1
+/* share of the last step in the smoothed time of a sub-step: some steps, so that one that was interrupted
+ * counts for little (test_session) */
+#define PAL_SUBSTEP_SHARE 0.1
 /* m/s: what no hand exceeds (test_session); larger bodies are worked on at a larger scale: their size in so many s.
  * Poses come in bursts: s that one may lie before the last. ns without a jump after which a tool that jumped is put
  * down */

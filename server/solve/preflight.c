@@ -251,24 +251,35 @@ static void find_locking(const pal_body_def *def, pal_preflight_body *out)
 
 /* ---- whole scene ---- */
 
+/* the components of a body that make forces */
+static void find_forces(pal_world *world, probe *p)
+{
+    for (int i = 0; i < pal_world_component_count(world); i++) {
+        const pal_component *component = pal_world_component(world, i);
+        pal_component_info info;
+        pal_world_component_info(world, i, &info);
+        if (info.body != p->body->name || component->effect->stage != PAL_STAGE_FORCE || p->n_force == 32) continue;
+        p->force[p->n_force++] = *component;
+    }
+}
+
+static int count_substeps(const pal_body *body, double step_s)
+{
+    return isfinite(body->dt_limit_s) ? (int)ceil(step_s / body->dt_limit_s * (1 - 1e-12)) : 1;
+}
+
 static pal_err check_body(pal_world *world, const pal_scene *scene, int b, pal_preflight_body *out)
 {
     pal_body *body = pal_world_body(world, b);
     probe p = {.world = world, .body = body};
     if (!(body->lowest_1_s > 0)) PAL_TRY(pal_world_find_lowest(world, b, NULL));
-    for (int i = 0; i < pal_world_component_count(world); i++) {
-        const pal_component *component = pal_world_component(world, i);
-        pal_component_info info;
-        pal_world_component_info(world, i, &info);
-        if (info.body != body->name || component->effect->stage != PAL_STAGE_FORCE || p.n_force == 32) continue;
-        p.force[p.n_force++] = *component;
-    }
+    find_forces(world, &p);
     *out = (pal_preflight_body){.name = scene->body[b].name,
                                 .n_point = body->n_dof,
                                 .n_node = body->n_node,
                                 .limit_s = body->dt_limit_s,
                                 .limit_edge_m = INFINITY};
-    out->n_sub = isfinite(out->limit_s) ? (int)ceil(scene->step_s / out->limit_s * (1 - 1e-12)) : 1;
+    out->n_sub = count_substeps(body, scene->step_s);
     double omega2;
     out->limit_node = pal_world_limit_node(world, b, &omega2);
     if (out->limit_node >= 0) {
@@ -298,6 +309,35 @@ pal_err pal_preflight_run(const pal_scene *scene, pal_preflight *out, pal_diagno
     }
     pal_world_destroy(world);
     return err;
+}
+
+/* of one body, from the fastest of a few evaluations: others may keep the processor busy */
+static double cost_of_body(pal_world *world, double step_s, int b)
+{
+    pal_body *body = pal_world_body(world, b);
+    const size_t n = 3 * (size_t)body->n_dof;
+    double best = INFINITY, *room = calloc(3 * n + 1, sizeof *room);
+    probe p = {.world = world, .body = body};
+    if (!room) return NAN;
+    find_forces(world, &p);
+    p.x = room;
+    memcpy(p.x, body->x, n * sizeof(double));
+    for (int k = 0; k < PAL_COST_EVALUATIONS; k++) {
+        p.spent_ns = 0, p.n_run = 0;
+        force_at(&p, room + n, 0, room + 2 * n);
+        best = fmin(best, predict_ms(&p, body, count_substeps(body, step_s), b));
+    }
+    memcpy(body->x, p.x, n * sizeof(double));
+    pal_body_update_nodes(body);
+    free(room);
+    return isfinite(best) ? best : NAN;
+}
+
+double pal_step_cost_ms(const pal_scene *scene, pal_world *world)
+{
+    double ms = 0;
+    for (int b = 0; b < scene->n_body; b++) ms += cost_of_body(world, scene->step_s, b);
+    return ms;
 }
 
 /* ---- sentences ---- */

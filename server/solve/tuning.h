@@ -14,4 +14,7 @@
 /* s: time constant of a body's return above which it is said to be slow: longer than a user waits for tissue to come
  * back (tests/solve/test_preflight.c) */
 #define PAL_SLOW_RETURN_S 10
+/* evaluations of the forces of which the fastest gives the cost of a step: a busy machine slows some of them
+ * (tests/solve/test_preflight.c) */
+#define PAL_COST_EVALUATIONS 3
 #endif

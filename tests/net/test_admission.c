@@ -1,7 +1,7 @@
 /* Who may come in: tickets, how many they admit, return, keys that are replaced, bans; and key files. */
-#include "server/net/admission.h"
-#include "server/net/ticket_keys.h"
-#include "server/net/tuning.h"
+#include "server/net/admission/admission.h"
+#include "server/net/admission/ticket_keys.h"
+#include "server/net/admission/tuning.h"
 #include "tests/check.h"
 
 #include <sys/stat.h>

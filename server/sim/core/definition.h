@@ -110,6 +110,7 @@ typedef struct pal_scene {
     double step_s;       /* one step of the world; sub-steps are the solver's own: 1/60 */
     double up[3];        /* unit, against gravity: (0, 0, 1)                          */
     double gravity_m_s2; /* 9.81; acts on bodies with the effect `gravity`            */
+    bool keep_real_time; /* a server gives up accuracy before time (server/net/hub_watch.h); no effect elsewhere */
     int max_substep;     /* budget of sub-steps per step, refused beyond: 2000        */
     int n_body;
     pal_body_def body[PAL_BODY_MAX];

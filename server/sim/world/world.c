@@ -431,6 +431,11 @@ int pal_world_substeps(const pal_world *world)
     return world->n_substep;
 }
 
+int pal_world_rest_substeps(const pal_world *world)
+{
+    return count_substeps(world, world->step_s, world->rest_limit_s);
+}
+
 double pal_world_energy_J(const pal_world *world)
 {
     double sum = 0;

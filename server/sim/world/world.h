@@ -108,10 +108,11 @@ void pal_world_component_info(const pal_world *world, int index, pal_component_i
 /* index of the first component of this effect on a body (-1: on any); -1: none */
 int pal_world_find_component(const pal_world *world, int body, const char *name);
 void pal_world_shown(const pal_world *world, int part, pal_shown *out);
-double pal_world_limit_s(const pal_world *world);  /* largest stable sub-step at the end of the last step */
-int pal_world_substeps(const pal_world *world);    /* of the last step; before the first: of the scene's step at rest */
-double pal_world_energy_J(const pal_world *world); /* kinetic energy and that of every component that has one */
-size_t pal_world_bytes(const pal_world *world);    /* memory of the world's arenas           */
+double pal_world_limit_s(const pal_world *world); /* largest stable sub-step at the end of the last step */
+int pal_world_substeps(const pal_world *world);   /* of the last step; before the first: of the scene's step at rest */
+int pal_world_rest_substeps(const pal_world *world); /* of the scene's step at rest, with the present materials */
+double pal_world_energy_J(const pal_world *world);   /* kinetic energy and that of every component that has one */
+size_t pal_world_bytes(const pal_world *world);      /* memory of the world's arenas           */
 /* dof of a body with the largest row sum of stiffness over mass by the bounds of its FORCE components, 1/s^2: it sets
  * the limit of explicit steps; -1: none has bounds, or nodes are not dofs. Overwrites body->g. [sim] */
 int pal_world_limit_node(const pal_world *world, int body, double *omega2);

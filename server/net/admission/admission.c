@@ -1,8 +1,8 @@
-#include "server/net/admission.h"
+#include "server/net/admission/admission.h"
 
 #include "server/base/log.h"
-#include "server/net/ticket_keys.h"
-#include "server/net/tuning.h"
+#include "server/net/admission/ticket_keys.h"
+#include "server/net/admission/tuning.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-#include "server/net/ticket_keys.h"
+#include "server/net/admission/ticket_keys.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -1,0 +1,204 @@
+/* What one member may cost the others: commands after which a step is longer than its time, orders that slow a session,
+ * jobs of one session and another, and accuracy that is given up before time. The clock is the test's: a session is
+ * slow when the time goes on by more than a step at once. What a step costs is the processor's, so that steps are so
+ * short here, or so long, that every machine agrees. */
+#include "server/net/tuning.h"
+#include "tests/net/command_room.h"
+#include "tests/session/sculpt_body.h"
+
+static clay_scene clay;
+#define TOP "\"x_m\":0.02,\"y_m\":0.02,\"z_m\":0.05"
+
+static void begin(double step_s, bool keep_real_time)
+{
+    clay.scene.step_s = step_s;
+    clay.scene.keep_real_time = keep_real_time;
+    order_begin(&clay.scene, NULL, 0);
+}
+
+/* the time goes on by n steps of the scene, of which the session makes one every `late` */
+static void run(mem_client *a, mem_client *b, int n, int late)
+{
+    for (int i = 0; i < n; i += late) {
+        manual_clock_advance(&served_clock, (uint64_t)late * served_step_ns);
+        manual_clock_settle(&served_clock, 1);
+        served_serve(a, b);
+    }
+}
+
+static double young_Pa(void)
+{
+    pal_material m;
+    pal_session_material(session, 0, &m);
+    return m.young_Pa;
+}
+
+static void a_command_that_is_slower_than_real_time_is_refused(void)
+{
+    mem_client tim, ada;
+    const double soft = clay.scene.body[0].material.young_Pa;
+    begin(1e-4, false); /* 0.1 ms, in which no machine steps 64 cells by hundreds of sub-steps */
+    join(&tim, "Tim", PAL_WIRE_ROLE_TRAINEE, 0);
+    join(&ada, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    run(&tim, &ada, 20, 1);
+    const double stiff = 1e12;
+    char args[64];
+    snprintf(args, sizeof args, "\"young_Pa\":%g", stiff);
+    send(&tim, "material", args);
+    for (int i = 0; i < 100 && !tim.n_text[PAL_CONTROL_ERROR]; i++) run(&tim, &ada, 4000, 1);
+    CHECK(strstr(trouble(&tim), "material: a step would take ") == trouble(&tim));
+    CHECK(strstr(trouble(&tim), " ms of its 0.1 ms, with ") != NULL);
+    CHECK_NEAR(young_Pa(), soft, 0);
+    /* softer is never refused */
+    const int before = tim.n_text[PAL_CONTROL_ERROR];
+    snprintf(args, sizeof args, "\"young_Pa\":%g", soft / 2);
+    send(&tim, "material", args);
+    run(&tim, &ada, 100, 1);
+    CHECK_NEAR(young_Pa(), soft / 2, 1e-9 * soft);
+    CHECK_INT(tim.n_text[PAL_CONTROL_ERROR], before);
+    mem_end(&tim), mem_end(&ada);
+    end();
+}
+
+static void so_is_a_configuration(void)
+{
+    mem_client tim, ada;
+    begin(1e-4, false);
+    join(&tim, "Tim", PAL_WIRE_ROLE_TRAINEE, 0);
+    join(&ada, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    CHECK(!order(&tim, "configure", "\"size\":3"));
+    CHECK(strstr(trouble(&tim), "configure: a step would take about ") == trouble(&tim));
+    CHECK(strstr(trouble(&tim), "an instructor may order it") != NULL);
+    CHECK_INT(tim.n_text[PAL_CONTROL_TOPOLOGY], 0);
+    CHECK(order(&ada, "configure", "\"size\":3"));
+    until_frame(&ada);
+    CHECK_INT(ada.n_text[PAL_CONTROL_TOPOLOGY], 1);
+    mem_end(&tim), mem_end(&ada);
+    end();
+}
+
+static void an_order_that_slows_the_session_is_taken_back(void)
+{
+    mem_client ada, eve;
+    begin(0.01, false);
+    const double soft = clay.scene.body[0].material.young_Pa;
+    join(&ada, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    join(&eve, "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    run(&ada, &eve, 200, 1);
+    send(&ada, "material", "\"young_Pa\":9000");
+    run(&ada, &eve, 200, 1);
+    CHECK_NEAR(young_Pa(), 9000, 0);
+    /* slower, but by less than twice: it stays */
+    for (int i = 0; i < 120; i++) run(&ada, &eve, 3, 3), run(&ada, &eve, 2, 1);
+    CHECK_INT(ada.n_text[PAL_CONTROL_ERROR], 0);
+    send(&ada, "material", "\"young_Pa\":8000");
+    run(&ada, &eve, 900, 3);
+    CHECK_TEXT(ada.last[PAL_CONTROL_ERROR].error.code, "undone");
+    CHECK(strstr(trouble(&ada), "material by Ada was taken back: the simulation ran 3.0 times slower") ==
+          trouble(&ada));
+    CHECK_TEXT(trouble(&eve), trouble(&ada));
+    CHECK_NEAR(young_Pa(), 9000, 0);
+    CHECK(young_Pa() != soft);
+    /* one that was given long before is not blamed */
+    run(&ada, &eve, 100, 1);
+    send(&ada, "material", "\"young_Pa\":7000");
+    run(&ada, &eve, 1500, 1);
+    run(&ada, &eve, 900, 3);
+    CHECK_INT(ada.n_text[PAL_CONTROL_ERROR], 1);
+    CHECK_NEAR(young_Pa(), 7000, 0);
+    /* an edit */
+    run(&ada, &eve, 200, 1);
+    char asset[PAL_WIRE_NAME_BYTES];
+    snprintf(asset, sizeof asset, "%s", part(&ada)->asset);
+    CHECK(order(&ada, "divide", TOP));
+    CHECK(reported(&ada, "cells") > 8);
+    until_frame(&ada);
+    const int topologies = ada.n_text[PAL_CONTROL_TOPOLOGY];
+    for (int i = 0; i < 200 && ada.n_text[PAL_CONTROL_ERROR] < 2; i++) run(&ada, &eve, 3, 3);
+    CHECK(strstr(trouble(&ada), "divide by Ada was taken back") == trouble(&ada));
+    WAIT_UNTIL(ada.n_text[PAL_CONTROL_TOPOLOGY] > topologies, &ada, &eve);
+    CHECK_TEXT(part(&ada)->asset, asset); /* the cells as they were */
+    mem_end(&ada), mem_end(&eve);
+    end();
+}
+
+static void accuracy_is_given_up_before_time_and_comes_back(void)
+{
+    mem_client eve;
+    begin(0.02, true);
+    join(&eve, "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    run(&eve, NULL, 100, 1);
+    run(&eve, NULL, 200, 1); /* in time: nothing happens */
+    CHECK_INT(eve.n_text[PAL_CONTROL_ERROR], 0);
+    char asset[PAL_WIRE_NAME_BYTES];
+    snprintf(asset, sizeof asset, "%s", part(&eve)->asset);
+    for (int i = 0; i < 400 && !eve.n_text[PAL_CONTROL_ERROR]; i++) run(&eve, NULL, 3, 3);
+    CHECK_TEXT(eve.last[PAL_CONTROL_ERROR].error.code, "quality");
+    CHECK(strstr(trouble(&eve), "3.0 times slower than real time: going on with ") == trouble(&eve));
+    WAIT_UNTIL(eve.n_text[PAL_CONTROL_TOPOLOGY] == 1, &eve, NULL);
+    until_frame(&eve);
+    CHECK(strstr(trouble(&eve), "1 level") != NULL);
+    CHECK(strcmp(part(&eve)->asset, asset) != 0);
+    /* in time again, with time to spare: after 20 s as before */
+    run(&eve, NULL, (int)(PAL_QUALITY_SPARE_NS / 20000000u) - 200, 1);
+    CHECK_INT(eve.n_text[PAL_CONTROL_ERROR], 1);
+    for (int i = 0; i < 2000 && eve.n_text[PAL_CONTROL_ERROR] < 2; i++) run(&eve, NULL, 1, 1);
+    CHECK(strstr(trouble(&eve), "there is time to spare: back to ") == trouble(&eve));
+    WAIT_UNTIL(eve.n_text[PAL_CONTROL_TOPOLOGY] == 2, &eve, NULL);
+    until_frame(&eve);
+    CHECK_TEXT(part(&eve)->asset, asset);
+    mem_end(&eve);
+    end();
+}
+
+/* one session's commands wait in its own queue, on its own thread */
+static void commands_of_one_session_do_not_wait_for_anothers(void)
+{
+    static pal_scene scene;
+    static mem_client ada, bo;
+    pal_session *two[2] = {NULL, NULL};
+    pal_diagnostic diag = {""};
+    pal_server_options net = {.transport = &pal_mem_transport, .open = true};
+    clay.scene.step_s = 0.02, clay.scene.keep_real_time = false;
+    scene = clay.scene;
+    snprintf(scene.name, sizeof scene.name, "second");
+    served_session(&clay.scene, (pal_session_options){0});
+    two[0] = session;
+    const pal_session_options options = {
+        .clock = &served_clock.clock, .lease_s = 60, .wake = pal_server_gate_wake, .user = &gate};
+    REQUIRE(!pal_session_open(&scene, &options, &diag, &two[1]));
+    REQUIRE(!pal_server_open(&net, two, 2, &diag, &server));
+    pal_server_connect(server, &gate);
+    transport = pal_server_transport(server);
+    join(&ada, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    memset(&bo, 0, sizeof bo);
+    bo.transport = transport, bo.peer = pal_mem_connect_from(transport, "second", "", "");
+    mem_enter(&bo, "Bo", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE, false);
+    mem_pull(&bo, 1000);
+    until_frame(&bo);
+    for (int i = 0; i < 7; i++) send(&ada, i % 2 ? "undo" : "extrude", i % 2 ? "" : TOP ",\"distance_m\":0.02");
+    mem_pull(&ada, 1000);
+    CHECK_TEXT(ada.last[PAL_CONTROL_ERROR].error.code, "busy"); /* of those two find no place */
+    send(&bo, "extrude", TOP ",\"distance_m\":0.02");
+    WAIT_UNTIL(n_answer(&bo) == 1, &ada, &bo);
+    CHECK_INT(bo.n_text[PAL_CONTROL_ANSWER], 1);
+    WAIT_UNTIL(n_answer(&ada) == 7, &ada, &bo);
+    mem_end(&ada), mem_end(&bo);
+    pal_server_close(server);
+    for (int i = 0; i < 2; i++) pal_session_close(two[i]);
+}
+
+int main(void)
+{
+    clay_make(&clay, 2, 0.1);
+    RUN(a_command_that_is_slower_than_real_time_is_refused);
+    RUN(so_is_a_configuration);
+    RUN(an_order_that_slows_the_session_is_taken_back);
+    /* levels: 2 */
+    for (int k = 0; k < clay.scene.body[0].model.n_value; k++)
+        if (!strcmp(clay.scene.body[0].model.value[k].key, "levels")) clay.scene.body[0].model.value[k].number[0] = 2;
+    RUN(commands_of_one_session_do_not_wait_for_anothers);
+    RUN(accuracy_is_given_up_before_time_and_comes_back);
+    clay_free(&clay);
+    return check_report();
+}
