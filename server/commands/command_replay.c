@@ -13,8 +13,8 @@ static cJSON *as_json(const pal_replay_report *r, double seconds)
     bool equal = r->n_hash == r->n_hash_equal;
     snprintf(hash, sizeof hash, "%016llx", (unsigned long long)r->last_hash);
     return PAL_JSON({"ok", JSON_BOOL(equal)}, {"steps", JSON_NUMBER(r->n_tick)}, {"poses", JSON_NUMBER(r->n_pose)},
-                    {"commands", JSON_NUMBER(r->n_command)}, {"hashes", JSON_NUMBER(r->n_hash)},
-                    {"hashes_equal", JSON_NUMBER(r->n_hash_equal)},
+                    {"commands", JSON_NUMBER(r->n_command)}, {"changes", JSON_NUMBER(r->n_change)},
+                    {"hashes", JSON_NUMBER(r->n_hash)}, {"hashes_equal", JSON_NUMBER(r->n_hash_equal)},
                     {"first_difference", equal ? cJSON_CreateNull() : JSON_NUMBER(r->first_difference)},
                     {"last_hash", JSON_TEXT(hash)}, {"cut", r->cut[0] ? JSON_TEXT(r->cut) : cJSON_CreateNull()},
                     {"seconds", JSON_NUMBER(seconds)});

@@ -23,6 +23,11 @@ static pal_err replay(watch *w, const char *log, pal_recorded_input *out, pal_di
     for (; w->n_body < scene->n_body; w->n_body++)
         if (pal_load_recorder_create(scene, w->n_body, &w->recorder[w->n_body]))
             return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the loads of a recording");
+    pal_replay_report whole;
+    PAL_TRY(pal_replay_run(log, NULL, NULL, &whole, diag));
+    if (whole.n_change > 0)
+        return PAL_REFUSE(diag, "%s: the scene was edited or switched %llu times in it: loads are taken from one scene",
+                          log, (unsigned long long)whole.n_change);
     PAL_TRY(pal_replay_run(log, scene, &(pal_replay_watch){step, w}, &out->replay, diag));
     if (out->replay.cut[0]) pal_log(PAL_LOG_WARN, "record", "%s; used up to there", out->replay.cut);
     int largest = 0;

@@ -156,7 +156,10 @@ static pal_err prepare_edit(pal_job *job, const pal_scene **scene)
 
 static void transfer_edit(pal_job *job)
 {
-    pal_session_transfer_begin(job->made.session, job->session, pal_sculpt_transfer, job->made.edit);
+    pal_material material[PAL_BODY_MAX];
+    for (int b = 0; b < job->scene->n_body; b++) material[b] = job->scene->body[b].material;
+    const pal_session_change change = {.body = job->body, .edit = &job->command, .material = material};
+    pal_session_transfer_begin(job->made.session, job->session, &change, pal_sculpt_transfer, job->made.edit);
 }
 
 static void commit_edit(pal_hub_body_edits *at, pal_job *job, pal_job_products *retired)

@@ -85,9 +85,13 @@ static pal_err prepare_switch(pal_job *job, const pal_scene **scene)
 
 static void transfer_switch(pal_job *job)
 {
-    pal_session_rehearse(job->made.session, job->session, pal_configuration_switch_snapshot,
+    pal_material material[PAL_BODY_MAX];
+    for (int b = 0; b < job->scene->n_body; b++) material[b] = job->scene->body[b].material;
+    const pal_session_change change = {.body = job->body, .configuration = &job->configuration, .material = material};
+    pal_session_rehearse(job->made.session, job->session, &change, pal_configuration_switch_snapshot,
                          pal_configuration_switch_rehearse, job->made.change);
-    pal_session_transfer_begin(job->made.session, job->session, pal_configuration_switch_transfer, job->made.change);
+    pal_session_transfer_begin(job->made.session, job->session, &change, pal_configuration_switch_transfer,
+                               job->made.change);
     job->report = job->made.change->report;
 }
 

@@ -19,7 +19,7 @@
 #include <unistd.h>
 #include <zlib.h>
 
-enum { VERSION = 5, RING_DEFAULT = 4 << 20, MAX_NUMBER = 9999 };
+enum { VERSION = 6, RING_DEFAULT = 4 << 20, MAX_NUMBER = 9999 };
 static const char magic[8] = {'p', 'a', 'l', 'i', 'n', 'l', 'o', 'g'};
 
 struct pal_input_log {
@@ -39,8 +39,9 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "logs are written in t
 
 typedef struct record_head {
     uint8_t kind, index;
-    uint16_t n_byte;
+    uint16_t zero;
     uint32_t crc;
+    uint32_t n_byte, zero_too;
     uint64_t step;
 } record_head;
 _Static_assert(sizeof(pal_input_header) == PAL_INPUT_HEADER && sizeof(record_head) == PAL_INPUT_HEAD,
@@ -62,6 +63,7 @@ static const struct field {
     {FIELD(MATERIAL, material.poisson)},
     {FIELD(MATERIAL, material.density_kg_m3)},
     {FIELD(MATERIAL, material.damping_1_s)},
+    {FIELD(MATERIAL, material.damping_ratio)},
     {FIELD(BRUSH, slot)},
     {FIELD(BRUSH, brush.kind)},
     {FIELD(BRUSH, brush.at_m)},
@@ -73,6 +75,16 @@ static const struct field {
     {FIELD(BRUSH, brush.stiffness_N_m)},
     {FIELD(COMPONENT, wanted)},
     {FIELD(COMPONENT, component)},
+    {FIELD(SCULPT, sculpt.kind)},
+    {FIELD(SCULPT, sculpt.cells)},
+    {FIELD(SCULPT, sculpt.stroke)},
+    {FIELD(SCULPT, sculpt.n_point)},
+    {FIELD(SCULPT, sculpt.cut)},
+    {FIELD(SCULPT, sculpt.cut_normal)},
+    {FIELD(SCULPT, sculpt.cut_m)},
+    {FIELD(SCULPT, materials)},
+    {FIELD(PREPARE, configuration)},
+    {FIELD(PREPARE, materials)},
     {FIELD(HASH, hash)},
     {FIELD(END, hash)},
     {FIELD(END, n_dropped)},
@@ -82,12 +94,18 @@ enum { N_FIELD = sizeof fields / sizeof *fields };
 _Static_assert(sizeof(pal_brush_kind) == 4 && sizeof(int) == 4 && sizeof(pal_stroke) == 56,
                "members have the size of the log's numbers, and no padding");
 
-/* -1: no such kind */
+/* without the points of an edit; -1: no such kind */
 static int payload_of(pal_input_kind kind)
 {
     size_t n_byte = 0;
     for (int i = 0; i < N_FIELD; i++) n_byte += fields[i].kind == kind ? fields[i].n_byte : 0;
-    return kind < PAL_INPUT_POSE || kind > PAL_INPUT_COMPONENT ? -1 : (int)n_byte;
+    return kind < PAL_INPUT_POSE || kind >= PAL_INPUT_KINDS ? -1 : (int)n_byte;
+}
+
+/* bytes of the points behind the payload */
+static size_t tail_of(const pal_input_record *record)
+{
+    return record->kind == PAL_INPUT_SCULPT ? 3 * sizeof(double) * (size_t)record->sculpt.n_point : 0;
 }
 
 pal_err pal_input_apply(pal_world *world, const pal_scene *scene, const pal_input_record *record, pal_diagnostic *diag)
@@ -108,8 +126,7 @@ pal_err pal_input_apply(pal_world *world, const pal_scene *scene, const pal_inpu
         return pal_world_brush(world, record->index, record->slot, &record->brush, diag);
     case PAL_INPUT_COMPONENT:
         return pal_world_switch_component(world, scene, record->index, record->component, record->wanted, diag);
-    case PAL_INPUT_HASH:
-    case PAL_INPUT_END:
+    default:
         break;
     }
     return PAL_ERR_OK;
@@ -204,7 +221,7 @@ uint64_t pal_scene_fingerprint(const pal_scene *scene)
     return h;
 }
 
-/* of head and payload with 0 for the CRC */
+/* of head, payload and points with 0 for the CRC */
 uint32_t pal_input_crc(const uint8_t *record, size_t n)
 {
     static const uint8_t none[sizeof(uint32_t)];
@@ -331,11 +348,13 @@ pal_err pal_input_log_open(const char *path, const pal_scene *scene, size_t ring
     return PAL_ERR_OK;
 }
 
+/* all but the points, which the CRC covers too */
 static size_t encode(const pal_input_record *record, uint8_t bytes[PAL_INPUT_HEAD + PAL_INPUT_PAYLOAD])
 {
+    const size_t n_tail = tail_of(record);
     record_head head = {.kind = (uint8_t)record->kind,
                         .index = (uint8_t)record->index,
-                        .n_byte = (uint16_t)payload_of(record->kind),
+                        .n_byte = (uint32_t)(payload_of(record->kind) + (int)n_tail),
                         .step = record->step};
     size_t at = sizeof head;
     memcpy(bytes, &head, sizeof head);
@@ -345,6 +364,7 @@ static size_t encode(const pal_input_record *record, uint8_t bytes[PAL_INPUT_HEA
         at += f->n_byte;
     }
     head.crc = pal_input_crc(bytes, at);
+    if (n_tail) head.crc = (uint32_t)crc32_z(head.crc, (const uint8_t *)record->sculpt.point_m, n_tail);
     memcpy(bytes, &head, sizeof head);
     return at;
 }
@@ -353,15 +373,17 @@ void pal_input_log_put(pal_input_log *log, const pal_input_record *record)
 {
     uint8_t bytes[PAL_INPUT_HEAD + PAL_INPUT_PAYLOAD];
     if (!log) return;
-    size_t n = encode(record, bytes);
+    const size_t n = encode(record, bytes), n_tail = tail_of(record);
     uint64_t filled = atomic_load_explicit(&log->filled, memory_order_relaxed);
     uint64_t out = atomic_load_explicit(&log->out, memory_order_acquire);
-    if (n > log->n_ring - (size_t)(filled - out)) {
+    if (n + n_tail > log->n_ring - (size_t)(filled - out)) {
         log->n_dropped++;
         return;
     }
     for (size_t k = 0; k < n; k++) log->ring[(size_t)(filled + k) & (log->n_ring - 1)] = bytes[k];
-    atomic_store_explicit(&log->filled, filled + n, memory_order_release);
+    const uint8_t *tail = (const uint8_t *)record->sculpt.point_m;
+    for (size_t k = 0; k < n_tail; k++) log->ring[(size_t)(filled + n + k) & (log->n_ring - 1)] = tail[k];
+    atomic_store_explicit(&log->filled, filled + n + n_tail, memory_order_release);
 }
 
 uint64_t pal_input_log_dropped(const pal_input_log *log)
@@ -416,6 +438,22 @@ pal_err pal_input_get_header(const char *name, const uint8_t *bytes, size_t n_by
     return PAL_ERR_OK;
 }
 
+/* the parts of an edit and of a configuration, of n_tail bytes behind the payload */
+static pal_err check_change(const char *name, size_t at, const pal_input_record *r, size_t n_tail, pal_diagnostic *diag)
+{
+    const pal_configuration *c = &r->configuration;
+    const char *const word[] = {c->model, c->element, c->law, c->solver};
+    if (r->kind == PAL_INPUT_SCULPT &&
+        ((unsigned)r->sculpt.kind >= PAL_SCULPT_KINDS || (unsigned)r->sculpt.cells.kind >= PAL_CELLS_COMMAND_KINDS ||
+         r->sculpt.n_point < 0 || tail_of(r) != n_tail || *(const uint8_t *)&r->sculpt.cut > 1))
+        return PAL_REFUSE(diag, "%s: byte %zu: no edit of kind %u, %u with %d points and %zu bytes of them", name, at,
+                          (unsigned)r->sculpt.kind, (unsigned)r->sculpt.cells.kind, r->sculpt.n_point, n_tail);
+    for (int k = 0; k < 4; k++)
+        if (!memchr(word[k], 0, PAL_NAME))
+            return PAL_REFUSE(diag, "%s: byte %zu: a configuration without names", name, at);
+    return PAL_ERR_OK;
+}
+
 pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_byte, size_t *at, pal_input_record *out,
                              pal_diagnostic *diag)
 {
@@ -424,8 +462,10 @@ pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_by
     record_head head;
     memcpy(&head, bytes + *at, sizeof head);
     pal_input_record record = {.kind = (pal_input_kind)head.kind, .index = head.index, .step = head.step};
-    if (payload_of(record.kind) != head.n_byte)
-        return PAL_REFUSE(diag, "%s: byte %zu: no record of kind %d has %d bytes", name, *at, head.kind, head.n_byte);
+    const int payload = payload_of(record.kind);
+    if (payload < 0 || head.n_byte < (uint32_t)payload ||
+        (head.n_byte > (uint32_t)payload && record.kind != PAL_INPUT_SCULPT))
+        return PAL_REFUSE(diag, "%s: byte %zu: no record of kind %d has %u bytes", name, *at, head.kind, head.n_byte);
     if (n_byte - *at - PAL_INPUT_HEAD < head.n_byte)
         return PAL_REFUSE(diag, "%s: byte %zu: the log is cut in a record", name, *at);
     if (pal_input_crc(bytes + *at, PAL_INPUT_HEAD + (size_t)head.n_byte) != head.crc)
@@ -441,7 +481,9 @@ pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_by
                           (unsigned)record.brush.kind, (unsigned)record.slot);
     if (record.wanted > 1 || record.component[PAL_NAME - 1] != 0)
         return PAL_REFUSE(diag, "%s: byte %zu: a component that is neither on nor off, or no name", name, *at);
-    *at = (size_t)(from - bytes);
+    PAL_TRY(check_change(name, *at, &record, head.n_byte - (size_t)payload, diag));
+    if (tail_of(&record)) record.sculpt.point_m = (const double *)(const void *)from;
+    *at += PAL_INPUT_HEAD + head.n_byte;
     *out = record;
     return PAL_ERR_OK;
 }

@@ -1,33 +1,39 @@
 /* Byte format of the input log, its writer and its reader, and what a record does. Private to server/session; replay.h
  * is the public interface.
  *
- * Little-endian. Header, 40 bytes: "palinlog", u32 version 5, u32 hash interval in steps, f64 step_s, u64 scene
- * fingerprint, u32 bodies, u32 tools. Records follow: u8 kind, u8 index (tool or body), u16 payload bytes, u32 CRC-32
- * of the record (zlib's, with 0 in this place), u64 steps taken since open, payload. A record takes effect before the
- * next step. The last record is END; a file without it was cut, and is good up to its last whole record.
+ * Little-endian. Header, 40 bytes: "palinlog", u32 version 6, u32 hash interval in steps, f64 step_s, u64 scene
+ * fingerprint, u32 bodies, u32 tools. Records follow: u8 kind, u8 index (tool or body), u16 0, u32 CRC-32 of the
+ * record (zlib's, with 0 in this place), u32 payload bytes, u32 0, u64 steps taken since open, payload. A record takes
+ * effect before the next step. The last record is END; a file without it was cut, and is good up to its last whole
+ * record.
  *
  *   POSE      tool   88  f64 position[3], quat[4], velocity[3], u32 buttons, u32 seq
  *   RELEASE   tool    0
  *   RESET     0       0
  *   RESET_BODY body   0
- *   MATERIAL  body   32  f64 young_Pa, poisson, density_kg_m3, damping_1_s
+ *   MATERIAL  body   40  f64 young_Pa, poisson, density_kg_m3, damping_1_s, damping_ratio
  *   BRUSH     body  112  u32 tool, u32 kind, f64 at_m[3], to_m[3], radius_m, softness, pressure_Pa, lift_m[3],
  *                        stiffness_N_m
  *   COMPONENT body   52  u32 on, name[48], zero-padded
- *   HASH      0       8  u64 world hash, at least every `hash interval` steps
- *   END       0      16  u64 world hash, u64 dropped records (0: the log is complete)
+ *   SCULPT    body  576  an edit of cells, paint or view that takes effect: pal_sculpt without its pointer, the
+ * materials with which it was prepared; then f64 point_m[n_point][3] PREPARE   body  576  a switch of configuration
+ * that was prepared: pal_configuration, materials REHEARSE  body    0  the prepared switch was rehearsed from this
+ * state (configuration_switch.h) SWITCH    body    0  and takes effect HASH      0       8  u64 world hash, at least
+ * every `hash interval` steps END       0      16  u64 world hash, u64 dropped records (0: the log is complete)
  *
  * The put functions copy into a ring buffer; they never wait, allocate or touch the file. A separate thread writes the
  * file, and sees to it once a second that it is on the disk (fdatasync). A record that does not fit is dropped and
  * counted, and END reports it. A file that is there is never written over: "run.log" becomes "run.2.log". */
 #ifndef PAL_SESSION_INPUT_LOG_H
 #define PAL_SESSION_INPUT_LOG_H
+#include "server/session/sculpt.h"
+#include "server/sim/core/configuration.h"
 #include "server/sim/world/world.h"
 
 enum {
     PAL_INPUT_HEADER = 40,
-    PAL_INPUT_HEAD = 16,
-    PAL_INPUT_PAYLOAD = 112,
+    PAL_INPUT_HEAD = 24,
+    PAL_INPUT_PAYLOAD = 640, /* without the points of an edit */
     PAL_INPUT_HASH_STEPS = 60,
     PAL_INPUT_HASH_MAX = 3600
 };
@@ -41,7 +47,12 @@ typedef enum pal_input_kind {
     PAL_INPUT_END,
     PAL_INPUT_BRUSH,
     PAL_INPUT_RESET_BODY,
-    PAL_INPUT_COMPONENT
+    PAL_INPUT_COMPONENT,
+    PAL_INPUT_SCULPT,
+    PAL_INPUT_PREPARE,
+    PAL_INPUT_REHEARSE,
+    PAL_INPUT_SWITCH,
+    PAL_INPUT_KINDS
 } pal_input_kind;
 
 typedef struct pal_input_record {
@@ -55,10 +66,13 @@ typedef struct pal_input_record {
     pal_brush brush;
     uint32_t wanted; /* COMPONENT: 0 or 1 */
     char component[PAL_NAME];
+    pal_sculpt sculpt; /* SCULPT; point_m: the writer's; of a record that was read: in the log's bytes, not aligned */
+    pal_configuration configuration;      /* PREPARE */
+    pal_material materials[PAL_BODY_MAX]; /* SCULPT, PREPARE: of the scene with which it was prepared */
 } pal_input_record;
 
-/* Applies any record but HASH and END to a world of the scene, as session and replay do. Errors as of the world's
- * function. [sim] */
+/* Applies any record that keeps the world to it (not HASH, END, SCULPT, PREPARE, REHEARSE, SWITCH), a world of the
+ * scene, as session and replay do. Errors as of the world's function. [sim] */
 pal_err pal_input_apply(pal_world *world, const pal_scene *scene, const pal_input_record *record, pal_diagnostic *diag);
 
 /* hash of everything in a scene that decides the simulation: steps, meshes, materials, entries; texts are excluded */

@@ -9,6 +9,7 @@
 typedef struct pal_replay_report {
     uint64_t n_tick; /* steps taken */
     uint64_t n_pose, n_command, n_hash, n_hash_equal;
+    uint64_t n_change;         /* edits and switches, each with another world */
     uint64_t first_difference; /* step of the first unequal hash, UINT64_MAX: none */
     uint64_t last_hash;        /* of the world at the end */
     /* where and how the log was cut or damaged, and the rest was not used; empty: it is whole */

@@ -65,7 +65,16 @@ typedef struct pal_session_options {
 /* builds the world and starts the thread; borrows the scene and its meshes until close. [load] */
 pal_err pal_session_open(const pal_scene *scene, const pal_session_options *options, pal_diagnostic *diag,
                          pal_session **out);
-/* opens a session for another scene with the options of a running one, with hold set and without a record. [any],
+/* What replaces a session by another, for its record: an edit or a configuration (the other is NULL), and the materials
+ * of the scene with which it was prepared [n_body]. Borrowed for the calls below, which take NULL too: the record ends
+ */
+typedef struct pal_session_change {
+    int body;
+    const struct pal_sculpt *edit;
+    const struct pal_configuration *configuration;
+    const pal_material *material;
+} pal_session_change;
+/* opens a session for another scene with the options of a running one, with hold set; the record goes on in it. [any],
  * while no other thread closes `before` */
 pal_err pal_session_open_after(const pal_session *before, const pal_scene *scene, pal_diagnostic *diag,
                                pal_session **out);
@@ -79,11 +88,12 @@ pal_world *pal_session_held_world(pal_session *session);
  * the phases counts for no lease. Disabled components stay disabled.
  *
  * A tool's holder sends poses and commands to before until transfer_end, and to next from then on. before keeps its
- * last frame, its record ends, and after transfer_end it can only be closed. INTERNAL: the thread could not be
- * started; before then continues. transfer_begin: [any], while others use before as usual and nobody uses next;
- * transfer_end: [net]. */
+ * last frame, its record goes on in next with the change in it, and after transfer_end it can only be closed. INTERNAL:
+ * the thread could not be started; before then continues. transfer_begin: [any], while others use before as usual and
+ * nobody uses next; transfer_end: [net]. */
 typedef void pal_session_transfer_fn(void *user, pal_world *next, const pal_world *before);
-void pal_session_transfer_begin(pal_session *next, pal_session *before, pal_session_transfer_fn *transfer, void *user);
+void pal_session_transfer_begin(pal_session *next, pal_session *before, const pal_session_change *change,
+                                pal_session_transfer_fn *transfer, void *user);
 pal_err pal_session_transfer_end(pal_session *next, pal_session *before, pal_diagnostic *diag);
 /* Shortens the transfer that follows. The thread of before stops between two steps for `snapshot`, which copies what it
  * needs from the world; before then continues while `rehearse` brings the world of next as close as it can. This
@@ -92,8 +102,8 @@ pal_err pal_session_transfer_end(pal_session *next, pal_session *before, pal_dia
 enum { PAL_SESSION_REHEARSALS_MAX = 3 };
 typedef bool pal_session_snapshot_fn(void *user, const pal_world *before);
 typedef void pal_session_rehearse_fn(void *user, pal_world *next);
-void pal_session_rehearse(pal_session *next, pal_session *before, pal_session_snapshot_fn *snapshot,
-                          pal_session_rehearse_fn *rehearse, void *user);
+void pal_session_rehearse(pal_session *next, pal_session *before, const pal_session_change *change,
+                          pal_session_snapshot_fn *snapshot, pal_session_rehearse_fn *rehearse, void *user);
 /* of a session that has replaced another: longest pause of its predecessor, s, and the number of rehearsals */
 double pal_session_pause_s(const pal_session *session, int *n_rehearsed);
 void pal_session_close(pal_session *session); /* stops and joins the thread; NULL is fine. [load] */

@@ -83,6 +83,7 @@ struct pal_session {
     uint64_t stopped_ns, pause_ns; /* when the predecessor had stopped, and the longest time that neither ran; for the
                                       thread that opens and transfers */
     int n_rehearsed;
+    bool prepared, recorded; /* the record has the configuration, and the change, that made this session */
     uint64_t end_ns;
     uint32_t n_subscriber[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* subscribers to a field */
     mark marks[N_MARK + 2];                               /* ring buffer, oldest at first */

@@ -1,8 +1,6 @@
 /* Transfer of one session to another that replaces it (session.h). */
 #include "server/session/session_core.h"
 
-#include "server/base/log.h"
-
 #include <stdio.h>
 #include <string.h>
 
@@ -86,13 +84,28 @@ static void measure_pause(pal_session *next, uint64_t since_ns)
     if (ns > next->pause_ns) next->pause_ns = ns;
 }
 
-void pal_session_rehearse(pal_session *next, pal_session *before, pal_session_snapshot_fn *snapshot,
-                          pal_session_rehearse_fn *rehearse, void *user)
+/* puts a change on the record of a session that stands still */
+static void record_change(pal_session *next, const pal_session *before, pal_input_kind kind,
+                          const pal_session_change *c)
+{
+    if (!before->log || !c) return;
+    pal_input_record record = {.kind = kind, .index = c->body, .step = before->step};
+    if (kind == PAL_INPUT_SCULPT) record.sculpt = *c->edit;
+    if (kind == PAL_INPUT_PREPARE) record.configuration = *c->configuration, next->prepared = true;
+    if (kind == PAL_INPUT_SCULPT || kind == PAL_INPUT_PREPARE)
+        memcpy(record.materials, c->material, sizeof *record.materials * (size_t)before->scene->n_body);
+    pal_input_log_put(before->log, &record);
+}
+
+void pal_session_rehearse(pal_session *next, pal_session *before, const pal_session_change *change,
+                          pal_session_snapshot_fn *snapshot, pal_session_rehearse_fn *rehearse, void *user)
 {
     for (int k = 0; k < PAL_SESSION_REHEARSALS_MAX; k++) {
         pal_session_stop(before);
         uint64_t stopped_ns = session_now_ns(next);
         bool wanted = snapshot(user, before->world);
+        if (k == 0) record_change(next, before, PAL_INPUT_PREPARE, change);
+        if (wanted) record_change(next, before, PAL_INPUT_REHEARSE, change);
         atomic_store_explicit(&before->stop, false, memory_order_release);
         pal_err err = pal_session_start(before, NULL);
         measure_pause(next, stopped_ns);
@@ -103,12 +116,16 @@ void pal_session_rehearse(pal_session *next, pal_session *before, pal_session_sn
     }
 }
 
-void pal_session_transfer_begin(pal_session *next, pal_session *before, pal_session_transfer_fn *transfer, void *user)
+void pal_session_transfer_begin(pal_session *next, pal_session *before, const pal_session_change *change,
+                                pal_session_transfer_fn *transfer, void *user)
 {
     next->transferred_ns = session_now_ns(next);
     atomic_store_explicit(&before->replaced, true, memory_order_relaxed);
     pal_session_stop(before);
     next->stopped_ns = session_now_ns(next);
+    next->recorded = change != NULL;
+    if (change && change->configuration && !next->prepared) record_change(next, before, PAL_INPUT_PREPARE, change);
+    record_change(next, before, change && change->edit ? PAL_INPUT_SCULPT : PAL_INPUT_SWITCH, change);
     transfer_state(next, before);
     transfer(user, next->world, before->world);
 }
@@ -117,12 +134,11 @@ pal_err pal_session_transfer_end(pal_session *next, pal_session *before, pal_dia
 {
     transfer_commands(next, before);
     transfer_tools(next, before, session_now_ns(next));
+    if (next->recorded) next->log = before->log, before->log = NULL;
     pal_err err = pal_session_start(next, diag);
     measure_pause(next, next->stopped_ns);
-    if (!err && before->log)
-        pal_log(PAL_LOG_WARN, "record", "%s: ends at step %llu: another session continues with a changed scene",
-                pal_input_log_path(before->log), (unsigned long long)before->step);
     if (!err) return PAL_ERR_OK;
+    if (next->recorded) before->log = next->log, next->log = NULL;
     atomic_store_explicit(&before->stop, false, memory_order_release);
     atomic_store_explicit(&before->replaced, false, memory_order_relaxed);
     (void)pal_session_start(before, NULL);

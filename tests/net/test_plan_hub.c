@@ -17,7 +17,7 @@ static void begin_hurt(void)
     pal_session *first = session;
     pal_diagnostic diag = {""};
     if (pal_session_open_after(first, &organ.scene, &diag, &session)) CHECK_FAIL("no session: %s", diag.text);
-    pal_session_transfer_begin(session, first, hurt, NULL);
+    pal_session_transfer_begin(session, first, NULL, hurt, NULL);
     if (pal_session_transfer_end(session, first, &diag)) CHECK_FAIL("does not follow: %s", diag.text);
     pal_session_close(first);
     manual_clock_settle(&served_clock, 1);

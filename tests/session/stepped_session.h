@@ -49,7 +49,7 @@ static inline const pal_frame *stepped_steps(pal_session *s, int n)
 static inline bool stepped_transfer(pal_session *to, pal_session *from, pal_session_transfer_fn *transfer, void *user)
 {
     pal_diagnostic diag = {""};
-    pal_session_transfer_begin(to, from, transfer, user);
+    pal_session_transfer_begin(to, from, NULL, transfer, user);
     if (pal_session_transfer_end(to, from, &diag)) {
         CHECK_FAIL("no transfer: %s", diag.text);
         return false;

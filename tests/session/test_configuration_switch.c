@@ -174,8 +174,8 @@ static void a_switch_is_rehearsed_while_the_session_runs_on(void)
     REQUIRE(!pal_configuration_switch_prepare(&scene, NULL, 0, &to, &diag, &change));
     REQUIRE(!pal_session_open_after(s, &change->set->scene, &diag, &next));
     rehearsed = s;
-    pal_session_rehearse(next, s, pal_configuration_switch_snapshot, rehearse_slowly, change);
-    pal_session_transfer_begin(next, s, pal_configuration_switch_transfer, change);
+    pal_session_rehearse(next, s, NULL, pal_configuration_switch_snapshot, rehearse_slowly, change);
+    pal_session_transfer_begin(next, s, NULL, pal_configuration_switch_transfer, change);
     CHECK(!pal_session_transfer_end(next, s, &diag));
     CHECK_NEAR(pal_session_pause_s(next, &n_rehearsed), 0, 0); /* no time passes in a transfer of this test */
     CHECK_INT(n_rehearsed, n_rehearsal);
