@@ -114,8 +114,10 @@ typedef struct pal_wire_hello {
     pal_wire_part_info part[PAL_WIRE_PART_MAX];
     pal_wire_tool_info tool[PAL_WIRE_TOOL_MAX];
     pal_wire_plan plan;
-    bool estimates;  /* `estimate` is available; false is not on the wire */
-    uint16_t you_id; /* member id, > 0                                              */
+    bool estimates;   /* `estimate` is available; false is not on the wire */
+    uint32_t started; /* Unix time at which the server began, s: another one after a reconnection is another run. 0:
+                         unknown, and not on the wire */
+    uint16_t you_id;  /* member id, > 0                                              */
     pal_wire_role you_role;
     char you_name[PAL_WIRE_MEMBER_NAME];
     int you_tool; /* granted tool, or PAL_WIRE_TOOL_NONE                                */

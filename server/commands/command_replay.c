@@ -52,7 +52,7 @@ int command_replay(int argc, char **argv)
     pal_diagnostic diag = {""};
     pal_replay_report report;
     double start = pal_clock_s();
-    const pal_replay_watch watch = {show, &common};
+    const pal_replay_watch watch = {.step = show, .user = &common};
     pal_err err = pal_scene_input_open(word[1], &input, &diag);
     if (!err && strict) err = pal_replay_run(word[0], NULL, NULL, &report, &diag);
     if (!err && strict && report.cut[0]) err = PAL_REFUSE(&diag, "%s", report.cut);

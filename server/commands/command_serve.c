@@ -17,6 +17,7 @@
 #include "server/net/hub_verb.h"
 #include "server/net/server.h"
 #include "server/scene/scene_arg.h"
+#include "server/session/resume.h"
 #include "server/study/studied_scene.h"
 
 #include <errno.h>
@@ -53,6 +54,8 @@ typedef struct serve_run {
     pal_studied_scene studied[MAX_SESSIONS]; /* in the configuration that the scene asks for   */
     pal_preflight preflight[MAX_SESSIONS];
     pal_session *session[MAX_SESSIONS];
+    pal_resume *resume[MAX_SESSIONS]; /* what a session goes on with; NULL: nothing */
+    bool resumes;
     pal_session_study study[MAX_SESSIONS]; /* borrowed by the server */
     pal_server_gate gate;
     pal_server *server;
@@ -141,7 +144,13 @@ static pal_err open_sessions(serve_run *run, pal_diagnostic *diag)
         pal_session_options options = {.wake = pal_server_gate_wake, .user = &run->gate, .only_observed = true};
         snprintf(record, sizeof record, run->n > 1 ? "%s.%s" : "%s", run->config.record, scene->name);
         if (run->config.record[0]) options.record_path = record;
-        PAL_TRY(pal_session_open(scene, &options, diag, &run->session[i]));
+        if (run->resumes) PAL_TRY(pal_resume_open(record, scene, diag, &run->resume[i]));
+        options.resume = run->resume[i];
+        if (run->resume[i])
+            pal_log(PAL_LOG_INFO, "resume", "%s goes on where %s ends, after %.1f s", scene->name,
+                    pal_resume_name(run->resume[i]), pal_resume_time_s(run->resume[i]));
+        PAL_TRY(pal_session_open(run->resume[i] ? pal_resume_scene(run->resume[i]) : scene, &options, diag,
+                                 &run->session[i]));
     }
     return PAL_ERR_OK;
 }
@@ -168,6 +177,7 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
                                   .viewer_folder = viewer_folder(&run->config, folder, sizeof folder),
                                   .error_m = run->config.error_m,
                                   .max_clients = run->config.max_clients,
+                                  .resume = run->resume,
                                   .study = run->study};
     PAL_TRY(pal_server_open(&options, run->session, run->n, diag, &run->server));
     if (!options.viewer_folder)
@@ -410,6 +420,8 @@ int command_serve(int argc, char **argv)
         {"--largest", NULL, PAL_FLAG_SWITCH, &largest_only, 0, 0,
          "keep the largest of several components of a surface or of cells only (see palpate prepare --help)"},
         {"--seconds", "S", PAL_FLAG_NUMBER, &run.seconds, 0.1, 1e9, "end after so long (a signal ends it)"},
+        {"--resume", NULL, PAL_FLAG_SWITCH, &run.resumes, 0, 0,
+         "go on where the newest recording of --record ends, after a crash too"},
         {"--help-protocol", NULL, PAL_FLAG_SWITCH, &help_protocol, 0, 0,
          "print the commands that clients may give: name, who, numbers, what it does"},
     };
@@ -439,19 +451,19 @@ int command_serve(int argc, char **argv)
                                       .progress = pal_report_progress,
                                       .user = &run.common};
     pal_err err = PAL_ERR_OK;
-    if (unit && run.surface.unit_m == 0) err = PAL_REFUSE(&diag, "--units: \"%.20s\" is not a unit", unit);
+    if (run.resumes && !run.config.record[0])
+        err = PAL_REFUSE(&diag, "--resume needs --record FILE, with which it goes on");
+    if (!err && unit && run.surface.unit_m == 0) err = PAL_REFUSE(&diag, "--units: \"%.20s\" is not a unit", unit);
     for (int i = 0; !err && i < (n_input ? n_input : 1); i++) err = load_input(&run, n_input ? input[i] : NULL, &diag);
     pal_report_progress(NULL, 0, &run.common);
     for (int i = 0; i < run.n; i++) make_unique(&run, i);
     if (!err) err = run_all(&run, &diag);
-    for (int i = 0; i < run.n && !err; i++) {
-        const int error = run.session[i] ? pal_session_record_error(run.session[i]) : 0;
-        if (error)
-            err = pal_diagnostic_set(&diag, PAL_ERR_IO, "the recording of %s ended before it: %s",
-                                     run.scene[i]->scene.name, strerror(error));
-    }
+    const int record_error = run.server && !err ? pal_server_record_error(run.server) : 0;
+    if (record_error)
+        err = pal_diagnostic_set(&diag, PAL_ERR_IO, "a recording ended before its session: %s", strerror(record_error));
     pal_server_close(run.server);
     for (int i = 0; i < run.n; i++) pal_session_close(run.session[i]);
+    for (int i = 0; i < run.n; i++) pal_resume_free(run.resume[i]);
     for (int i = 0; i < run.n; i++) pal_studied_scene_close(&run.studied[i]);
     for (int i = 0; i < run.n; i++) pal_scene_free(run.scene[i]);
     return err ? pal_report_refusal(&run.common, err, &diag) : 0;

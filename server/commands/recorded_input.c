@@ -28,7 +28,7 @@ static pal_err replay(watch *w, const char *log, pal_recorded_input *out, pal_di
     if (whole.n_change > 0)
         return PAL_REFUSE(diag, "%s: the scene was edited or switched %llu times in it: loads are taken from one scene",
                           log, (unsigned long long)whole.n_change);
-    PAL_TRY(pal_replay_run(log, scene, &(pal_replay_watch){step, w}, &out->replay, diag));
+    PAL_TRY(pal_replay_run(log, scene, &(pal_replay_watch){.step = step, .user = w}, &out->replay, diag));
     if (out->replay.cut[0]) pal_log(PAL_LOG_WARN, "record", "%s; used up to there", out->replay.cut);
     int largest = 0;
     for (int b = 0; b < w->n_body; b++) pal_load_recorder_stop(w->recorder[b]);

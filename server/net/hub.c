@@ -16,6 +16,7 @@
 #include "server/net/hub_watch.h"
 #include "server/net/transport/plain_text.h"
 #include "server/net/tuning.h"
+#include "server/session/resume.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -349,6 +350,7 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
     hub->error_m = options->error_m;
     hub->verb = options->verb ? options->verb : pal_verb_table;
     hub->n_verb = options->verb ? options->n_verb : pal_verb_count;
+    hub->started_s = (uint32_t)time(NULL);
     hub->health_on_main = !options->allow_remote && !(options->health && options->health[0]);
     hub->max_members = options->max_clients > 0 ? options->max_clients : PAL_HUB_CLIENTS;
     hub->max_clients = hub->max_members + PAL_UNJOINED_PLACES;
@@ -367,7 +369,17 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
         pal_members_init(&room->members, scene->n_tool);
         if (options->open) room->members.rights = pal_rights_named("") & ~(1u << PAL_RIGHT_COMPONENT);
         if (options->study && options->study[i].n > 0) room->study = options->study[i];
-        err = pal_stream_open(session[i], options->error_m, diag, &room->stream);
+        if (options->resume && options->resume[i]) {
+            /* what it borrows is the hub's now */
+            for (int b = 0; b < scene->n_body; b++) {
+                pal_hub_body_edits *edits = &room->edits[b];
+                pal_resume_take_edits(options->resume[i], b, &edits->sculptor, &edits->edit, &edits->change,
+                                      &edits->base);
+            }
+            session[i] = NULL;
+            room->own = true;
+        }
+        err = pal_stream_open(room->session, options->error_m, diag, &room->stream);
         if (!err) hub->n_room++;
     }
     if (err) return pal_hub_destroy(hub), err;
@@ -422,6 +434,13 @@ void pal_hub_goodbye(pal_hub *hub)
 void pal_hub_start_ticket(const pal_hub *hub, pal_wire_role role, char text[PAL_TICKET_TEXT])
 {
     pal_admission_start_ticket(hub->admission, role, text);
+}
+
+int pal_hub_record_error(const pal_hub *hub)
+{
+    int error = 0;
+    for (int r = 0; r < hub->n_room && !error; r++) error = pal_session_record_error(hub->room[r].session);
+    return error;
 }
 
 int pal_hub_clients(const pal_hub *hub)

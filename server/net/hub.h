@@ -18,10 +18,12 @@ typedef struct pal_server_options {
     const char *viewer_folder; /* files served at /; NULL: none                                             */
     const struct pal_transport_ops *transport; /* NULL: websockets */
     /* of the hub */
-    bool open;            /* whoever comes is what it asks to be; else a client without a ticket is a viewer */
-    const char *key_file; /* of tickets (ticket_keys.h); NULL: none */
-    double error_m;       /* bound of streamed positions per axis; 0: 1/3000 of the box, at most 0.05 mm */
-    int max_clients;      /* 0: 200 */
+    bool open;                  /* whoever comes is what it asks to be; else a client without a ticket is a viewer */
+    const char *key_file;       /* of tickets (ticket_keys.h); NULL: none */
+    double error_m;             /* bound of streamed positions per axis; 0: 1/3000 of the box, at most 0.05 mm */
+    int max_clients;            /* 0: 200 */
+    struct pal_resume **resume; /* of sessions that go on after a crash: their edits, taken [n_session]; NULL, or an
+                                   entry of it: none */
     const pal_session_study *study; /* [n_session], borrowed until close; NULL: none */
     const pal_verb *verb;           /* commands that clients may give [n_verb], borrowed; NULL: pal_verb_table */
     int n_verb;
@@ -37,5 +39,6 @@ void pal_hub_events(pal_hub *hub, pal_peer_events *out); /* for pal_transport_op
 void pal_hub_goodbye(pal_hub *hub);                      /* drops every peer with code 1001 and accepts no new ones */
 /* a ticket for who has started the server (admission.h). [load] */
 void pal_hub_start_ticket(const pal_hub *hub, pal_wire_role role, char text[PAL_TICKET_TEXT]);
+int pal_hub_record_error(const pal_hub *hub); /* errno of a recording that has ended; 0: none */
 int pal_hub_clients(const pal_hub *hub);
 #endif

@@ -161,6 +161,7 @@ struct pal_hub {
     pal_admission *admission;
     int n_room, max_members, max_clients, n_client; /* max_clients: members and those who have not joined yet */
     bool leaving;
+    uint32_t started_s;   /* Unix time */
     bool health_on_main;  /* health and metrics are served beside the rest */
     pal_hub_room *room;   /* [n_room] */
     pal_client *client;   /* [max_clients] */

@@ -106,6 +106,7 @@ static void send_hello(pal_client *c)
     pal_stream_hello(c->room->stream, hello);
     pal_hub_put_plan(c->room, &hello->plan);
     hello->estimates = true;
+    hello->started = c->hub->started_s;
     hello->credit = (uint32_t)c->credit.max;
     hello->you_id = (uint16_t)m->id;
     hello->you_role = (pal_wire_role)m->role;

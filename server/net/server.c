@@ -136,6 +136,11 @@ void pal_server_start_ticket(const pal_server *server, pal_wire_role role, char 
     pal_hub_start_ticket(server->hub, role, text);
 }
 
+int pal_server_record_error(const pal_server *server)
+{
+    return pal_hub_record_error(server->hub);
+}
+
 int pal_server_port(const pal_server *server)
 {
     return server->address.port;

@@ -85,6 +85,8 @@ static const struct field {
     {FIELD(SCULPT, materials)},
     {FIELD(PREPARE, configuration)},
     {FIELD(PREPARE, materials)},
+    {FIELD(STATE, n_point)},
+    {FIELD(RESTORE, n_point)},
     {FIELD(HASH, hash)},
     {FIELD(END, hash)},
     {FIELD(END, n_dropped)},
@@ -102,10 +104,23 @@ static int payload_of(pal_input_kind kind)
     return kind < PAL_INPUT_POSE || kind >= PAL_INPUT_KINDS ? -1 : (int)n_byte;
 }
 
-/* bytes of the points behind the payload */
-static size_t tail_of(const pal_input_record *record)
+/* what stands behind the payload: one or two lists of points */
+typedef struct tail {
+    const double *list[2];
+    size_t n_byte; /* of each that is there */
+    int n_list;
+} tail;
+static tail tail_of(const pal_input_record *r)
 {
-    return record->kind == PAL_INPUT_SCULPT ? 3 * sizeof(double) * (size_t)record->sculpt.n_point : 0;
+    const size_t point = 3 * sizeof(double);
+    if (r->kind == PAL_INPUT_SCULPT) return (tail){{r->sculpt.point_m}, point * (size_t)r->sculpt.n_point, 1};
+    if (r->kind == PAL_INPUT_STATE || r->kind == PAL_INPUT_RESTORE)
+        return (tail){{r->x, r->v}, point * (size_t)r->n_point, 2};
+    return (tail){.n_list = 0};
+}
+static size_t tail_bytes(const tail *t)
+{
+    return t->n_byte * (size_t)t->n_list;
 }
 
 pal_err pal_input_apply(pal_world *world, const pal_scene *scene, const pal_input_record *record, pal_diagnostic *diag)
@@ -292,17 +307,34 @@ static void *writer(void *user)
     return NULL;
 }
 
-/* a new file of this name, or with the next number before its suffix; its descriptor, < 0: errno */
-static int create(const char *path, char name[PATH_MAX])
+/* "run.log", "run.2.log", ... */
+static void name_file(const char *path, int number, char *name, size_t cap)
 {
     const char *slash = strrchr(path, '/'), *dot = strrchr(slash ? slash : path, '.');
     const int n_stem = (int)(dot && dot > (slash ? slash + 1 : path) ? (size_t)(dot - path) : strlen(path));
+    (void)snprintf(name, cap, "%s", path);
+    if (number > 1) (void)snprintf(name, cap, "%.*s.%d%s", n_stem, path, number, path + n_stem);
+}
+
+bool pal_input_log_newest(const char *path, char *name, size_t cap)
+{
+    int k = 1;
+    for (; k <= MAX_NUMBER; k++) {
+        name_file(path, k, name, cap);
+        if (access(name, F_OK)) break;
+    }
+    if (k > 1) name_file(path, k - 1, name, cap);
+    return k > 1;
+}
+
+/* a new file of this name, or with the next number before its suffix; its descriptor, < 0: errno */
+static int create(const char *path, char name[PATH_MAX])
+{
     struct stat there;
     errno = ENAMETOOLONG;
     if (strlen(path) > PATH_MAX - 8) return -1;
     for (int k = 1; k <= MAX_NUMBER; k++) {
-        (void)snprintf(name, PATH_MAX, "%s", path);
-        if (k > 1) (void)snprintf(name, PATH_MAX, "%.*s.%d%s", n_stem, path, k, path + n_stem);
+        name_file(path, k, name, PATH_MAX);
         const int file = open(name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
         if (file >= 0 || errno != EEXIST) return file;
         /* a device is no recording */
@@ -351,10 +383,10 @@ pal_err pal_input_log_open(const char *path, const pal_scene *scene, size_t ring
 /* all but the points, which the CRC covers too */
 static size_t encode(const pal_input_record *record, uint8_t bytes[PAL_INPUT_HEAD + PAL_INPUT_PAYLOAD])
 {
-    const size_t n_tail = tail_of(record);
+    const tail t = tail_of(record);
     record_head head = {.kind = (uint8_t)record->kind,
                         .index = (uint8_t)record->index,
-                        .n_byte = (uint32_t)(payload_of(record->kind) + (int)n_tail),
+                        .n_byte = (uint32_t)((size_t)payload_of(record->kind) + tail_bytes(&t)),
                         .step = record->step};
     size_t at = sizeof head;
     memcpy(bytes, &head, sizeof head);
@@ -364,25 +396,35 @@ static size_t encode(const pal_input_record *record, uint8_t bytes[PAL_INPUT_HEA
         at += f->n_byte;
     }
     head.crc = pal_input_crc(bytes, at);
-    if (n_tail) head.crc = (uint32_t)crc32_z(head.crc, (const uint8_t *)record->sculpt.point_m, n_tail);
+    for (int k = 0; k < t.n_list && t.n_byte > 0; k++)
+        head.crc = (uint32_t)crc32_z(head.crc, (const uint8_t *)t.list[k], t.n_byte);
     memcpy(bytes, &head, sizeof head);
     return at;
+}
+
+/* at most two pieces */
+static void put_bytes(pal_input_log *log, uint64_t at, const void *bytes, size_t n)
+{
+    const size_t begin = (size_t)at & (log->n_ring - 1), first = n < log->n_ring - begin ? n : log->n_ring - begin;
+    if (n == 0) return;
+    memcpy(log->ring + begin, bytes, first);
+    memcpy(log->ring, (const uint8_t *)bytes + first, n - first);
 }
 
 void pal_input_log_put(pal_input_log *log, const pal_input_record *record)
 {
     uint8_t bytes[PAL_INPUT_HEAD + PAL_INPUT_PAYLOAD];
     if (!log) return;
-    const size_t n = encode(record, bytes), n_tail = tail_of(record);
+    const tail t = tail_of(record);
+    const size_t n = encode(record, bytes), n_tail = tail_bytes(&t);
     uint64_t filled = atomic_load_explicit(&log->filled, memory_order_relaxed);
     uint64_t out = atomic_load_explicit(&log->out, memory_order_acquire);
     if (n + n_tail > log->n_ring - (size_t)(filled - out)) {
         log->n_dropped++;
         return;
     }
-    for (size_t k = 0; k < n; k++) log->ring[(size_t)(filled + k) & (log->n_ring - 1)] = bytes[k];
-    const uint8_t *tail = (const uint8_t *)record->sculpt.point_m;
-    for (size_t k = 0; k < n_tail; k++) log->ring[(size_t)(filled + n + k) & (log->n_ring - 1)] = tail[k];
+    put_bytes(log, filled, bytes, n);
+    for (int k = 0; k < t.n_list; k++) put_bytes(log, filled + n + t.n_byte * (size_t)k, t.list[k], t.n_byte);
     atomic_store_explicit(&log->filled, filled + n + n_tail, memory_order_release);
 }
 
@@ -443,11 +485,16 @@ static pal_err check_change(const char *name, size_t at, const pal_input_record 
 {
     const pal_configuration *c = &r->configuration;
     const char *const word[] = {c->model, c->element, c->law, c->solver};
+    if (r->n_point < 0 || r->sculpt.n_point < 0)
+        return PAL_REFUSE(diag, "%s: byte %zu: %d points", name, at, r->n_point < 0 ? r->n_point : r->sculpt.n_point);
+    const tail t = tail_of(r);
+    if (tail_bytes(&t) != n_tail)
+        return PAL_REFUSE(diag, "%s: byte %zu: %zu bytes of points, wanted %zu", name, at, n_tail, tail_bytes(&t));
     if (r->kind == PAL_INPUT_SCULPT &&
         ((unsigned)r->sculpt.kind >= PAL_SCULPT_KINDS || (unsigned)r->sculpt.cells.kind >= PAL_CELLS_COMMAND_KINDS ||
-         r->sculpt.n_point < 0 || tail_of(r) != n_tail || *(const uint8_t *)&r->sculpt.cut > 1))
-        return PAL_REFUSE(diag, "%s: byte %zu: no edit of kind %u, %u with %d points and %zu bytes of them", name, at,
-                          (unsigned)r->sculpt.kind, (unsigned)r->sculpt.cells.kind, r->sculpt.n_point, n_tail);
+         *(const uint8_t *)&r->sculpt.cut > 1))
+        return PAL_REFUSE(diag, "%s: byte %zu: no edit of kind %u, %u", name, at, (unsigned)r->sculpt.kind,
+                          (unsigned)r->sculpt.cells.kind);
     for (int k = 0; k < 4; k++)
         if (!memchr(word[k], 0, PAL_NAME))
             return PAL_REFUSE(diag, "%s: byte %zu: a configuration without names", name, at);
@@ -464,7 +511,8 @@ pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_by
     pal_input_record record = {.kind = (pal_input_kind)head.kind, .index = head.index, .step = head.step};
     const int payload = payload_of(record.kind);
     if (payload < 0 || head.n_byte < (uint32_t)payload ||
-        (head.n_byte > (uint32_t)payload && record.kind != PAL_INPUT_SCULPT))
+        (head.n_byte > (uint32_t)payload && record.kind != PAL_INPUT_SCULPT && record.kind != PAL_INPUT_STATE &&
+         record.kind != PAL_INPUT_RESTORE))
         return PAL_REFUSE(diag, "%s: byte %zu: no record of kind %d has %u bytes", name, *at, head.kind, head.n_byte);
     if (n_byte - *at - PAL_INPUT_HEAD < head.n_byte)
         return PAL_REFUSE(diag, "%s: byte %zu: the log is cut in a record", name, *at);
@@ -482,7 +530,12 @@ pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_by
     if (record.wanted > 1 || record.component[PAL_NAME - 1] != 0)
         return PAL_REFUSE(diag, "%s: byte %zu: a component that is neither on nor off, or no name", name, *at);
     PAL_TRY(check_change(name, *at, &record, head.n_byte - (size_t)payload, diag));
-    if (tail_of(&record)) record.sculpt.point_m = (const double *)(const void *)from;
+    const tail t = tail_of(&record);
+    if (record.kind == PAL_INPUT_SCULPT && t.n_byte) record.sculpt.point_m = (const double *)(const void *)from;
+    if (t.n_list == 2) {
+        record.x = (const double *)(const void *)from;
+        record.v = (const double *)(const void *)(from + t.n_byte);
+    }
     *at += PAL_INPUT_HEAD + head.n_byte;
     *out = record;
     return PAL_ERR_OK;

@@ -15,11 +15,14 @@
  *   BRUSH     body  112  u32 tool, u32 kind, f64 at_m[3], to_m[3], radius_m, softness, pressure_Pa, lift_m[3],
  *                        stiffness_N_m
  *   COMPONENT body   52  u32 on, name[48], zero-padded
- *   SCULPT    body  576  an edit of cells, paint or view that takes effect: pal_sculpt without its pointer, the
- * materials with which it was prepared; then f64 point_m[n_point][3] PREPARE   body  576  a switch of configuration
- * that was prepared: pal_configuration, materials REHEARSE  body    0  the prepared switch was rehearsed from this
- * state (configuration_switch.h) SWITCH    body    0  and takes effect HASH      0       8  u64 world hash, at least
- * every `hash interval` steps END       0      16  u64 world hash, u64 dropped records (0: the log is complete)
+ *   SCULPT    body  473  an edit takes effect: pal_sculpt without its pointer, materials; f64 point_m[n_point][3]
+ *   PREPARE   body  562  a switch was prepared: pal_configuration, materials
+ *   REHEARSE  body    0  the prepared switch was rehearsed from this state (configuration_switch.h)
+ *   SWITCH    body    0  and takes effect
+ *   STATE     body    4  u32 points; f64 x[points][3], v[points][3]: now and then, for who goes on after a crash
+ *   RESTORE   body    4  the same, which the world takes: how a session begins that goes on after a crash
+ *   HASH      0       8  u64 world hash, at least every `hash interval` steps
+ *   END       0      16  u64 world hash, u64 dropped records (0: the log is complete)
  *
  * The put functions copy into a ring buffer; they never wait, allocate or touch the file. A separate thread writes the
  * file, and sees to it once a second that it is on the disk (fdatasync). A record that does not fit is dropped and
@@ -52,6 +55,8 @@ typedef enum pal_input_kind {
     PAL_INPUT_PREPARE,
     PAL_INPUT_REHEARSE,
     PAL_INPUT_SWITCH,
+    PAL_INPUT_STATE,
+    PAL_INPUT_RESTORE,
     PAL_INPUT_KINDS
 } pal_input_kind;
 
@@ -69,6 +74,8 @@ typedef struct pal_input_record {
     pal_sculpt sculpt; /* SCULPT; point_m: the writer's; of a record that was read: in the log's bytes, not aligned */
     pal_configuration configuration;      /* PREPARE */
     pal_material materials[PAL_BODY_MAX]; /* SCULPT, PREPARE: of the scene with which it was prepared */
+    int n_point;                          /* STATE, RESTORE */
+    const double *x, *v;                  /* [n_point][3]; of a record that was read: in the log's bytes, not aligned */
 } pal_input_record;
 
 /* Applies any record that keeps the world to it (not HASH, END, SCULPT, PREPARE, REHEARSE, SWITCH), a world of the
@@ -79,6 +86,8 @@ pal_err pal_input_apply(pal_world *world, const pal_scene *scene, const pal_inpu
 uint64_t pal_scene_fingerprint(const pal_scene *scene);
 
 typedef struct pal_input_log pal_input_log;
+/* the newest of the files that a path names by numbers; false: there is none */
+bool pal_input_log_newest(const char *path, char *name, size_t cap);
 /* creates a new file and starts the writer thread; ring_byte 0: 4 MiB. IO, MEMORY. [load] */
 pal_err pal_input_log_open(const char *path, const pal_scene *scene, size_t ring_byte, pal_diagnostic *diag,
                            pal_input_log **out);

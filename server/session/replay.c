@@ -3,51 +3,11 @@
 #include "server/session/replay.h"
 
 #include "server/mesh/files/file_bytes.h"
+#include "server/session/log_check.h"
 #include "server/session/replay_changes.h"
 
-#include <stdio.h>
 #include <stdlib.h>
-
-/* is the log ordered, and within the scene's tools and bodies? *n_good: bytes up to its end or its first bad record,
- * of which the report tells */
-static pal_err check(const char *name, const uint8_t *bytes, size_t n_byte, pal_input_header *header, size_t *n_good,
-                     pal_replay_report *report, pal_diagnostic *diag)
-{
-    size_t at = 0;
-    uint64_t step = 0, hash_step = 0;
-    PAL_TRY(pal_input_get_header(name, bytes, n_byte, header, &at, diag));
-    for (;;) {
-        pal_input_record record;
-        pal_diagnostic bad = {""};
-        const size_t begin = *n_good = at;
-        if (pal_input_get_record(name, bytes, n_byte, &at, &record, &bad)) {
-            snprintf(report->cut, sizeof report->cut, "%s", bad.text);
-            return PAL_ERR_OK;
-        }
-        /* END first: a log with dropped records may have gaps, and the drop is the better diagnostic */
-        if (record.kind == PAL_INPUT_END && record.n_dropped)
-            return PAL_REFUSE(diag, "%s: %llu records were lost while the log was written", name,
-                              (unsigned long long)record.n_dropped);
-        if (record.step < step || record.step > hash_step + header->hash_steps)
-            return PAL_REFUSE(diag, "%s: byte %zu: step %llu does not follow step %llu", name, begin,
-                              (unsigned long long)record.step, (unsigned long long)step);
-        step = record.step;
-        if (record.kind == PAL_INPUT_HASH) hash_step = step;
-        bool tool = record.kind == PAL_INPUT_POSE || record.kind == PAL_INPUT_RELEASE;
-        if ((tool && record.index >= (int)header->n_tool) ||
-            ((record.kind == PAL_INPUT_MATERIAL || record.kind == PAL_INPUT_BRUSH ||
-              record.kind == PAL_INPUT_RESET_BODY || record.kind >= PAL_INPUT_COMPONENT) &&
-             record.index >= (int)header->n_body))
-            return PAL_REFUSE(diag, "%s: byte %zu: the scene has no %s %d", name, begin, tool ? "tool" : "body",
-                              record.index);
-        report->n_change += record.kind == PAL_INPUT_SCULPT || record.kind == PAL_INPUT_SWITCH;
-        if (record.kind != PAL_INPUT_END) continue;
-        if (at != n_byte)
-            return PAL_REFUSE(diag, "%s: byte %zu: %zu bytes after the end record", name, at, n_byte - at);
-        *n_good = at;
-        return PAL_ERR_OK;
-    }
-}
+#include <string.h>
 
 /* applies one record to the world, which has taken record->step steps */
 static pal_err apply(pal_replayed *r, const pal_input_record *record, pal_replay_report *report, pal_diagnostic *diag)
@@ -62,6 +22,8 @@ static pal_err apply(pal_replayed *r, const pal_input_record *record, pal_replay
             report->first_difference = record->step;
         return PAL_ERR_OK;
     }
+    if (record->kind == PAL_INPUT_STATE) return PAL_ERR_OK;
+    if (record->kind == PAL_INPUT_RESTORE) return pal_replayed_restore(r, record, diag);
     bool pose = record->kind == PAL_INPUT_POSE;
     report->n_pose += pose;
     report->n_command += !pose && record->kind != PAL_INPUT_RELEASE;
@@ -103,19 +65,17 @@ static pal_err run(const char *name, const uint8_t *bytes, size_t n_byte, pal_re
 pal_err pal_replay_parse(const char *name, const uint8_t *bytes, size_t n_byte, const pal_scene *scene,
                          const pal_replay_watch *watch, pal_replay_report *out, pal_diagnostic *diag)
 {
-    pal_input_header header;
+    pal_log_check log;
     pal_replay_report report = {.first_difference = UINT64_MAX};
-    PAL_TRY(check(name, bytes, n_byte, &header, &n_byte, &report, diag));
+    PAL_TRY(pal_log_check_run(name, bytes, n_byte, scene, &log, diag));
+    n_byte = log.n_good;
+    report.n_change = log.n_change;
+    memcpy(report.cut, log.cut, sizeof report.cut);
     if (scene) {
-        if (header.fingerprint != pal_scene_fingerprint(scene) || (int)header.n_tool != scene->n_tool ||
-            (int)header.n_body != scene->n_body)
-            return PAL_REFUSE(diag,
-                              "%s: recorded from another scene or another state of it (mesh, material or entries "
-                              "differ)",
-                              name);
         pal_replayed *replayed = calloc(1, sizeof *replayed); /* too large for the stack */
         pal_err err = replayed ? pal_replayed_begin(replayed, scene, diag) : PAL_ERR_MEMORY;
         if (!err) err = run(name, bytes, n_byte, replayed, watch, &report, diag);
+        if (!err && watch && watch->end) watch->end(watch->user, replayed->world);
         if (replayed) pal_replayed_end(replayed);
         free(replayed);
         PAL_TRY(err);

@@ -23,6 +23,7 @@ typedef struct pal_replay_report {
 typedef struct pal_replay_watch {
     bool (*step)(void *user, const pal_world *world, double fraction);
     void *user;
+    void (*end)(void *user, const pal_world *world); /* after the last input; NULL: none */
 } pal_replay_watch;
 
 /* Runs the log at path against a world of this scene. A different hash is not an error; the report gives it. REFUSED:

@@ -1,5 +1,8 @@
 #include "server/session/replay_changes.h"
 
+#include "server/sim/transfer/transfer_world.h"
+
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -133,6 +136,26 @@ static void finish_switch(pal_replayed *r)
     r->body[b].change = r->next;
     if (r->next_base) r->body[b].base = r->next_base;
     r->next_world = NULL, r->next = NULL, r->next_base = NULL;
+}
+
+pal_err pal_replayed_restore(pal_replayed *r, const pal_input_record *record, pal_diagnostic *diag)
+{
+    pal_body *body = pal_world_body(r->world, record->index);
+    const size_t n = 3 * sizeof(double) * (size_t)record->n_point;
+    if (record->n_point != body->n_dof)
+        return PAL_REFUSE(diag, "step %llu: a state of %d points for %s, which has %d",
+                          (unsigned long long)record->step, record->n_point, body->name, body->n_dof);
+    /* in the log they are not aligned */
+    double *x = malloc(2 * n + 1), *v = x + 3 * (size_t)record->n_point;
+    if (!x) return PAL_ERR_MEMORY;
+    memcpy(x, record->x, n);
+    memcpy(v, record->v, n);
+    bool finite = true;
+    for (int i = 0; i < 6 * record->n_point; i++) finite = finite && isfinite(x[i]);
+    if (finite) pal_transfer_set_state(body, x, v);
+    free(x);
+    return finite ? PAL_ERR_OK
+                  : PAL_REFUSE(diag, "step %llu: a state that is not finite", (unsigned long long)record->step);
 }
 
 pal_err pal_replayed_change(pal_replayed *r, const pal_input_record *record, pal_diagnostic *diag)

@@ -33,6 +33,8 @@ pal_err pal_replayed_begin(pal_replayed *replayed, const pal_scene *scene, pal_d
 void pal_replayed_end(pal_replayed *replayed);
 /* SCULPT, PREPARE, REHEARSE, SWITCH. REFUSED: what the record says cannot be */
 pal_err pal_replayed_change(pal_replayed *replayed, const pal_input_record *record, pal_diagnostic *diag);
+/* RESTORE, STATE: a body takes positions and velocities; REFUSED: it has another number of points */
+pal_err pal_replayed_restore(pal_replayed *replayed, const pal_input_record *record, pal_diagnostic *diag);
 /* notes the state of a component that a COMPONENT record has set, for worlds that replace this one */
 void pal_replayed_component(pal_replayed *replayed, const pal_input_record *record);
 #endif

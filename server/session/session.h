@@ -58,6 +58,8 @@ typedef struct pal_session_options {
     bool unpaced;             /* steps as fast as possible (tests, replay); the newest frame still wins */
     void (*wake)(void *user); /* [sim] called after a frame is published; must not block; NULL: none */
     void *user;
+    struct pal_resume
+        *resume; /* the session goes on where a recording ends (resume.h), of whose scene it is; NULL: at rest */
     const char *record_path; /* path of the new input log (replay.h, input_log.h); NULL: none */
     const pal_clock *clock;  /* of pacing, leases, arrival times and estimates; NULL: pal_clock_monotonic */
 } pal_session_options;

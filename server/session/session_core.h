@@ -76,6 +76,7 @@ struct pal_session {
     bool paused, observed;
     int single;                    /* single steps requested while paused */
     uint64_t step;                 /* taken since open; resets do not count */
+    uint64_t state_step;           /* when the record gets the next state */
     uint64_t n_late;               /* steps that began late */
     uint64_t work_ns;              /* processor time of the last step */
     double substep_ns;             /* smoothed processor time of a sub-step while no body sleeps; 0: unknown */

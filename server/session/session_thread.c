@@ -8,6 +8,7 @@
 #include "server/base/log.h"
 #include "server/base/thread.h"
 #include "server/base/vec3.h"
+#include "server/session/resume.h"
 #include "server/session/tuning.h"
 
 #include <math.h>
@@ -259,6 +260,18 @@ static void time_substep(pal_session *s)
     s->substep_ns += s->substep_ns > 0 ? PAL_SUBSTEP_SHARE * (ns - s->substep_ns) : ns;
 }
 
+/* positions and velocities, for who goes on after a crash */
+static void record_state(pal_session *s, pal_input_kind kind)
+{
+    s->state_step = s->step + (uint64_t)ceil(PAL_STATE_S / s->scene->step_s);
+    for (int b = 0; b < pal_world_body_count(s->world); b++) {
+        const pal_body *body = pal_world_body(s->world, b);
+        pal_input_log_put(
+            s->log, &(pal_input_record){
+                        .kind = kind, .index = b, .step = s->step, .n_point = body->n_dof, .x = body->x, .v = body->v});
+    }
+}
+
 static void step(pal_session *s)
 {
     if (s->n_marks == 0) mark_pace(s, session_now_ns(s));
@@ -273,6 +286,7 @@ static void step(pal_session *s)
     if (s->log && s->step % PAL_INPUT_HASH_STEPS == 0)
         pal_input_log_put(
             s->log, &(pal_input_record){.kind = PAL_INPUT_HASH, .step = s->step, .hash = pal_world_hash(s->world)});
+    if (s->log && s->step >= s->state_step) record_state(s, PAL_INPUT_STATE);
     if (err) report_error(s, err);
 }
 
@@ -349,7 +363,10 @@ static pal_err copy_plan(pal_session *s)
 
 static pal_err prepare(pal_session *s, pal_diagnostic *diag)
 {
-    PAL_TRY(pal_world_create(s->scene, diag, &s->world));
+    if (s->options.resume)
+        s->world = pal_resume_take_world(s->options.resume);
+    else
+        PAL_TRY(pal_world_create(s->scene, diag, &s->world));
     pal_err err = copy_plan(s);
     s->command = pal_command_queue_create(N_COMMAND, sizeof(pal_command));
     bool whole = !err && s->command;
@@ -360,7 +377,12 @@ static pal_err prepare(pal_session *s, pal_diagnostic *diag)
         pal_triple_buffer_init(&s->tool[t].triple_buffer, &s->tool[t].slot[0], &s->tool[t].slot[1],
                                &s->tool[t].slot[2]);
     if (!s->options.record_path) return PAL_ERR_OK;
-    PAL_TRY(pal_input_log_open(s->options.record_path, s->scene, 0, diag, &s->log));
+    const pal_scene *recorded = s->options.resume ? pal_resume_recorded_scene(s->options.resume) : s->scene;
+    PAL_TRY(pal_input_log_open(s->options.record_path, recorded, 0, diag, &s->log));
+    if (s->options.resume) {
+        pal_resume_record(s->options.resume, s->log);
+        record_state(s, PAL_INPUT_RESTORE);
+    }
     pal_log(PAL_LOG_INFO, "record", "%s: records %s", pal_input_log_path(s->log), s->scene->name);
     return PAL_ERR_OK;
 }
@@ -410,6 +432,8 @@ pal_err pal_session_open(const pal_scene *scene, const pal_session_options *opti
     s->observed = true;
     atomic_init(&s->beat_ns, session_now_ns(s));
     pal_err err = prepare(s, diag);
+    for (int b = 0; !err && s->options.resume && b < scene->n_body; b++)
+        pal_world_current_material(s->world, b, &s->material[b]);
     if (!err && !s->options.hold) err = pal_session_start(s, diag);
     if (err) {
         if (s->log) pal_input_log_close(s->log, 0, 0);
@@ -425,6 +449,7 @@ pal_err pal_session_open_after(const pal_session *before, const pal_scene *scene
 {
     pal_session_options options = before->options;
     options.hold = true;
+    options.resume = NULL;
     options.record_path = NULL;
     return pal_session_open(scene, &options, diag, out);
 }

@@ -1,6 +1,7 @@
 /* A recording goes on through what its members do to the scene: edits of cells, paint, cuts, undo, another rest shape,
  * switches of configuration, components and materials. A replay makes the same worlds from it, with the same hashes. */
 #include "server/session/replay.h"
+#include "server/session/resume.h"
 #include "tests/net/command_room.h"
 #include "tests/session/sculpt_body.h"
 
@@ -113,6 +114,101 @@ static void through_switches(void)
     replays_equal(5);
 }
 
+static size_t slurp(const char *name, uint8_t *bytes, size_t cap)
+{
+    FILE *file = fopen(name, "rb");
+    size_t n = file ? fread(bytes, 1, cap, file) : 0;
+    if (file) fclose(file);
+    return n;
+}
+
+/* positions of body 0 when a replay has taken its last step */
+typedef struct last_state {
+    double x[3 * 4096], size_m;
+    int n;
+} last_state;
+static void keep_state(void *user, const pal_world *world)
+{
+    last_state *to = user;
+    const pal_body *body = pal_world_view_body(world, 0);
+    to->n = body->n_dof < 4096 ? body->n_dof : 4096;
+    to->size_m = body->length_scale_m;
+    memcpy(to->x, body->x, 3 * sizeof(double) * (size_t)to->n);
+}
+
+static bool step_on(void *user, const pal_world *world, double fraction)
+{
+    (void)user, (void)world, (void)fraction;
+    return true;
+}
+
+/* kill -9 at 20 moments of the session that was recorded last: what goes on has the shape, the paint, the material and
+ * the place that everything had when the last record reached the disk; grasps and friction begin anew, hence 2 % of
+ * the body's size */
+static void goes_on_after_a_kill_at_any_moment(void)
+{
+    static uint8_t bytes[1 << 22];
+    static last_state exact, resumed;
+    const size_t n = slurp(path, bytes, sizeof bytes);
+    REQUIRE(n > 10000 && n < sizeof bytes);
+    uint32_t seed = 12345;
+    for (int k = 0; k < 20; k++) {
+        pal_diagnostic diag = {""};
+        pal_replay_report report;
+        pal_resume *resume = NULL;
+        seed = seed * 1664525u + 1013904223u;
+        const size_t cut = 2000 + (size_t)((double)seed / 4294967296.0 * (double)(n - 2000));
+        FILE *file = fopen(path, "wb");
+        fwrite(bytes, 1, cut, file);
+        fclose(file);
+        pal_err err =
+            pal_replay_run(path, &clay.scene, &(pal_replay_watch){step_on, &exact, keep_state}, &report, &diag);
+        if (!err) err = pal_resume_open(path, &clay.scene, &diag, &resume);
+        if (err) CHECK_FAIL("cut at %zu: %s", cut, diag.text);
+        if (err || !resume) continue;
+        pal_world *world = pal_resume_take_world(resume);
+        keep_state(&resumed, world);
+        double farthest = 0;
+        CHECK_INT(resumed.n, exact.n);
+        for (int i = 0; i < 3 * exact.n; i++) farthest = fmax(farthest, fabs(resumed.x[i] - exact.x[i]));
+        CHECK_LE(farthest, 0.02 * exact.size_m);
+        pal_world_destroy(world);
+        pal_resume_free(resume);
+    }
+}
+
+/* a session that goes on is recorded, and its record replays equal from its beginning; edits can still be undone */
+static void what_goes_on_is_recorded(void)
+{
+    pal_diagnostic diag = {""};
+    pal_replay_report report;
+    pal_resume *resume = NULL;
+    mem_client a, b;
+    char second[64];
+    REQUIRE(!pal_resume_open(path, &clay.scene, &diag, &resume) && resume);
+    served_session(pal_resume_scene(resume), (pal_session_options){.record_path = path, .resume = resume});
+    served_open((pal_server_options){.resume = &resume});
+    join(&a, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, 0);
+    join(&b, "Ben", PAL_WIRE_ROLE_TRAINEE, 1);
+    play(&a, &b, 60);
+    CHECK(order(&a, "undo", "")); /* of an edit before the crash */
+    until_frame(&a);
+    play(&a, &b, 60);
+    CHECK(order(&a, "configure", "\"step_ms\":15"));
+    until_frame(&a);
+    play(&a, &b, 60);
+    mem_end(&a), mem_end(&b);
+    end();
+    pal_resume_free(resume);
+    snprintf(second, sizeof second, "%s.2", path);
+    pal_err err = pal_replay_run(second, &clay.scene, NULL, &report, &diag);
+    if (err) CHECK_FAIL("%s", diag.text);
+    CHECK_INT(report.n_hash_equal, report.n_hash);
+    CHECK_LE(3, report.n_hash);
+    CHECK_TEXT(report.cut, "");
+    unlink(second);
+}
+
 int main(void)
 {
     const int fd = mkstemp(path);
@@ -121,8 +217,11 @@ int main(void)
     order_point(&point[0], "subdivision_fem", "", 1);
     order_point(&point[1], "fem", "hex8_bbar", 8);
     order_point(&point[2], "subdivision_fem", "", 2);
-    RUN(through_edits);
     RUN(through_switches);
+    RUN(goes_on_after_a_kill_at_any_moment);
+    RUN(through_edits);
+    RUN(what_goes_on_is_recorded);
+    RUN(goes_on_after_a_kill_at_any_moment);
     clay_free(&clay);
     unlink(path);
     return check_report();

@@ -48,6 +48,7 @@ export const SERVER_MESSAGES = Object.freeze(
             "component_reasons?": "texts",
             "component_required?": "numbers",
             "estimates?": "bool",
+            "started?": "u32",
             you: { id: "u16", role: "role", name: "text", "tool?": "tool" },
         },
         topology: {

@@ -100,6 +100,8 @@ export class Messages {
         const scene = (/** @type {import("./app_state.js").Hello | null} */ h) =>
             [h?.session, h?.box_min_m, h?.box_max_m, h?.up].join();
         const sameScene = scene(state.hello) === scene(message);
+        if (state.hello?.started && message.started !== state.hello.started)
+            this.page.layout.notice("The server was started again.", NOTICE_MS);
         state.hello = message;
         state.ownId = message.you.id;
         state.ownTool = message.you.tool ?? -1;
