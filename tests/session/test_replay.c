@@ -286,13 +286,25 @@ static void a_file_is_never_written_over(void)
     rmdir(folder);
 }
 
+/* of the first state in the log of the live session, which stands after its first step */
+static rlim_t state_bytes(void)
+{
+    pal_input_header header;
+    pal_input_record record_;
+    size_t at = 0;
+    if (pal_input_get_header("log", whole, n_whole, &header, &at, NULL)) return 0;
+    for (size_t begin = at; !pal_input_get_record("log", whole, n_whole, &at, &record_, NULL); begin = at)
+        if (record_.kind == PAL_INPUT_STATE) return at - begin;
+    return 0;
+}
+
 /* a limit of the file's size, as a disk that fills up: the error is known before the end, and what was written is good
  */
 static void a_disk_that_fills_up_is_told_while_it_records(void)
 {
     struct rlimit before, small;
     REQUIRE(!getrlimit(RLIMIT_FSIZE, &before));
-    small = before, small.rlim_cur = 16000;
+    small = before, small.rlim_cur = 4000 + state_bytes();
     signal(SIGXFSZ, SIG_IGN);
     unlink(path);
     REQUIRE(!setrlimit(RLIMIT_FSIZE, &small));
