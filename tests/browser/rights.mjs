@@ -67,5 +67,27 @@ await run(async () => {
     );
     check("who is removed is told by whom", gone.includes("Ada has removed you"), gone);
     await tim.screenshot({ path: `${pictures}/rights_removed.png` });
+
+    // a server that stands still: the page says so, dims the old picture, and takes it back
+    const before = Date.now();
+    process.kill(info.pid, "SIGSTOP");
+    const silent = await until(
+        () => text(ada, "state-text"),
+        (state) => state.startsWith("no answer"),
+        60000,
+    );
+    check(
+        "a server that does not answer is told",
+        /^no answer from the server for \d+ s$/.test(silent),
+        `${silent}, after ${Date.now() - before} ms`,
+    );
+    check("and the picture is dimmed", await ada.evaluate(() => document.body.classList.contains("silent")));
+    await ada.screenshot({ path: `${pictures}/rights_silent.png` });
+    process.kill(info.pid, "SIGCONT");
+    await until(
+        () => text(ada, "state-text"),
+        (state) => !state.startsWith("no answer"),
+    );
+    check("until it answers", await until(() => ada.evaluate(() => !document.body.classList.contains("silent"))));
     checkConsoles();
 });

@@ -46,6 +46,13 @@ export class Layout {
         if (!this.noticeTimer) this.notice("");
     }
 
+    /** the picture is old while the server does not answer @param {number} seconds 0: it answers */
+    silence(seconds) {
+        document.body.classList.toggle("silent", seconds > 0);
+        if (seconds > 0) this.connection("lost", `no answer from the server for ${seconds} s`);
+        else if (htmlById("state-text").textContent?.startsWith("no answer")) this.connection("live", "live");
+    }
+
     /** @param {import("./link.js").ConnectionState} state @param {string} text */
     connection(state, text) {
         htmlById("state").dataset.state = state;

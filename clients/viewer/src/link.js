@@ -15,6 +15,8 @@ const RETRY_MS = 500; // pause before the first reconnection, doubled with each 
 const RETRY_MAX_MS = 5000;
 const PAGE_SILENCE_MS = 3000; // a page that has been silent for longer no longer holds its tool
 const PING_MS = 1000;
+const SILENT_MS = 1100; // the server sends its status three times a second: longer is no answer
+const LISTEN_MS = 200; // between two looks at that: it is told within 1.5 s
 const FIGURES_MS = 500;
 const LATENCY_MAX_MS = 10000; // a larger value comes from the clock of another connection
 const SPARE_MAX = 4; // pairs of arrays that wait for reuse
@@ -49,7 +51,8 @@ const FINAL = new Map([
  *   | ({type: "frame", part: number, shown: Shown | null} & FrameArrays)
  *   | {type: "field", part: number, name: string, low: number, high: number, level: Uint8Array}
  *   | {type: "tools", tools: import("./wire.js").Tool[]}
- *   | {type: "figures", figures: LinkFigures}} PageMessage
+ *   | {type: "silence", seconds: number}
+ *   | {type: "figures", figures: LinkFigures}} PageMessage silence: of the server, whole seconds; 0: it answers again
  */
 /**
  * Messages from the page to the worker.
@@ -95,6 +98,8 @@ export class Link {
     /** @type {number[]} */
     lastPosition = [0, 0, 0];
     figuresAt = 0;
+    heardAt = 0; // ms
+    silence = 0; // s, as the page was told
     /** @type {Map<number, Part>} */
     parts = new Map();
     /** @type {Map<number, number>} epoch of the asset requested last */
@@ -122,6 +127,7 @@ export class Link {
 
     reset() {
         this.lastPose = null;
+        this.reportSilence(0);
         this.commands.waiting = [];
         this.parts.clear();
         this.requested.clear();
@@ -249,6 +255,8 @@ export class Link {
 
     /** @param {string | ArrayBuffer} data */
     receive(data) {
+        this.heardAt = this.env.now();
+        if (this.silence) this.reportSilence(0);
         if (typeof data === "string") {
             this.bytes += data.length;
             this.control(readControl(data));
@@ -270,9 +278,24 @@ export class Link {
             message.parts.forEach((part, i) => this.loadPart(i, part));
             this.report("live", "live");
             this.ping();
+            this.listen();
         } else if (message.type === "topology") message.parts.forEach((part, i) => this.loadPart(i, part));
         else if (message.type === "pong") this.rtt = this.env.now() - message.stamp_ms;
         this.env.post({ type: "control", message });
+    }
+
+    /** @param {number} seconds */
+    reportSilence(seconds) {
+        if (seconds === this.silence) return;
+        this.silence = seconds;
+        this.env.post({ type: "silence", seconds });
+    }
+
+    listen() {
+        const generation = this.generation;
+        const silent = this.env.now() - this.heardAt;
+        this.reportSilence(silent > SILENT_MS ? Math.max(1, Math.floor(silent / 1000)) : 0);
+        this.env.later(() => generation === this.generation && this.listen(), LISTEN_MS);
     }
 
     ping() {

@@ -62,6 +62,9 @@ export class Messages {
                 if (!sameTools(marks.drawn, data.tools, UNSEEN * stage.size)) stage.dirty = true;
                 state.tools = data.tools;
                 break;
+            case "silence":
+                layout.silence(data.seconds);
+                break;
             case "figures":
                 Object.assign(state.figures, data.figures);
                 break;

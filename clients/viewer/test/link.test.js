@@ -294,6 +294,28 @@ test("says why and stays away after a refusal", () => {
     assert.match(s.of("state").at(-1).text, /cannot take part.*Bo has removed you/);
 });
 
+test("a server that does not answer is told within 1.5 s, with the seconds, and that it answers again", async () => {
+    const { s } = await joined();
+    const reported = () => s.of("silence").map((m) => m.seconds);
+    const pass = (/** @type {number} */ ms) => {
+        for (let t = 0; t < ms; t += 100) {
+            s.time += 100;
+            for (const { call } of s.waiting.splice(0)) call();
+        }
+    };
+    for (let i = 0; i < 10; i++) {
+        s.sockets[0].receive({ type: "pong", stamp_ms: 0 });
+        pass(300);
+    }
+    assert.deepEqual(reported(), []);
+    pass(1300);
+    assert.deepEqual(reported(), [1]);
+    pass(2000);
+    assert.deepEqual(reported(), [1, 2, 3]);
+    s.sockets[0].receive({ type: "pong", stamp_ms: 0 });
+    assert.deepEqual(reported(), [1, 2, 3, 0]);
+});
+
 test("a full session is tried again, and the page says so", () => {
     const s = stand();
     s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee", ticket: "" });

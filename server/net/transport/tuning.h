@@ -12,4 +12,11 @@
 #define PAL_REQUEST_WAIT_NS  4000000000u
 /* sockets that are kept for the health listener when the main one is full (test_ws) */
 #define PAL_HEALTH_SOCKETS 16
+/* credit (test_packet): s for which cycles go on beyond a round trip, the time after which TCP sends a lost segment
+ * again; s of a window; s above the smallest round trip at which cycles queue, a step and the scheduling of a busy
+ * client; growth in a window in which nothing queues */
+#define PAL_CREDIT_STALL_S  0.25
+#define PAL_CREDIT_WINDOW_S 0.5
+#define PAL_CREDIT_QUEUE_S  0.03
+#define PAL_CREDIT_GROWTH   1.25
 #endif
