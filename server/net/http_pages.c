@@ -4,7 +4,9 @@
 
 #include "server/base/json_members.h"
 #include "server/net/transport/plain_text.h"
+#include "server/net/tuning.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -40,14 +42,22 @@ static int count_record_errors(const pal_hub *hub, int *error)
     return n;
 }
 
-/* assets are built before the first request */
+/* assets are built before the first request; a session that is much slower than real time should get nobody more */
 static void get_ready(pal_hub *hub, pal_reply *reply)
 {
     int error = 0;
-    char text[160];
+    double slowdown = 0;
+    char text[160] = "ready\n";
     const int n_error = count_record_errors(hub, &error);
-    snprintf(text, sizeof text, "a recording has ended: %s\n", strerror(error));
-    reply_plain(reply, hub->leaving || n_error ? 503 : 200, hub->leaving ? "ending\n" : n_error ? text : "ready\n");
+    for (int r = 0; r < hub->n_room; r++) {
+        const pal_frame *f = hub->room[r].stream->frame;
+        if (f && !f->paused) slowdown = fmax(slowdown, f->slowdown);
+    }
+    const bool bad = hub->leaving || n_error || slowdown > PAL_SLOW_MAX;
+    if (slowdown > PAL_SLOW_MAX)
+        snprintf(text, sizeof text, "a session runs %.1f times slower than real time\n", slowdown);
+    if (n_error) snprintf(text, sizeof text, "a recording has ended: %s\n", strerror(error));
+    reply_plain(reply, bad ? 503 : 200, hub->leaving ? "ending\n" : text);
 }
 
 static void get_sessions(pal_hub *hub, pal_reply *reply)
@@ -98,9 +108,35 @@ static void print_metrics(const metric *row, const metric *end, char *text, size
     }
 }
 
+/* time of steps by session, whose label is its number; returns the bytes written */
+static size_t print_histograms(const pal_hub *hub, char *text, size_t cap)
+{
+    size_t n = (size_t)snprintf(text, cap,
+                                "# HELP palpate_sim_step_seconds_by_session Processor time of a step.\n"
+                                "# TYPE palpate_sim_step_seconds_by_session histogram\n");
+    for (int r = 0; r < hub->n_room && n < cap; r++) {
+        const pal_stream *s = hub->room[r].stream;
+        uint64_t sum = 0;
+        char bound[16] = "+Inf";
+        for (int k = 0; k <= PAL_STEP_BOUNDS && n < cap; k++) {
+            sum += s->n_step[k];
+            if (k < PAL_STEP_BOUNDS) snprintf(bound, sizeof bound, "%g", pal_step_bound_s[k]);
+            n += (size_t)snprintf(text + n, cap - n,
+                                  "palpate_sim_step_seconds_by_session_bucket{session=\"%d\",le=\"%s\"} %llu\n", r,
+                                  k < PAL_STEP_BOUNDS ? bound : "+Inf", (unsigned long long)sum);
+        }
+        if (n < cap)
+            n += (size_t)snprintf(text + n, cap - n,
+                                  "palpate_sim_step_seconds_by_session_sum{session=\"%d\"} %.9g\n"
+                                  "palpate_sim_step_seconds_by_session_count{session=\"%d\"} %llu\n",
+                                  r, s->step_sum_s, r, (unsigned long long)sum);
+    }
+    return n < cap ? n : cap;
+}
+
 static void get_metrics(pal_hub *hub, pal_reply *reply)
 {
-    static char text[16384]; /* [net] only */
+    static char text[32768]; /* [net] only */
     const pal_hub_count *n = &hub->count;
     double step_s = 0, late = 0, encode_s = 0, n_encode = 0, frame_byte = 0, delta_byte = 0;
     int role[PAL_WIRE_ROLE_COUNT] = {0};
@@ -149,7 +185,8 @@ static void get_metrics(pal_hub *hub, pal_reply *reply)
         {.label = "reason=\"overflow\"", .value = (double)n->n_overflow},
         {"handshakes_total", "Clients that joined or were turned away.", "result=\"joined\"", (double)n->n_joined},
         {.label = "result=\"refused\"", .value = (double)n->n_refused_join}};
-    print_metrics(rows, rows + sizeof rows / sizeof *rows, text, sizeof text);
+    const size_t n_histogram = print_histograms(hub, text, sizeof text / 2);
+    print_metrics(rows, rows + sizeof rows / sizeof *rows, text + n_histogram, sizeof text - n_histogram);
     reply_text(reply, 200, "text/plain; version=0.0.4", text, strlen(text));
 }
 

@@ -169,7 +169,8 @@ void pal_hub_join(pal_client *c, const pal_wire_join *wanted)
     c->hub->count.n_joined++;
     c->topology_deltas = wanted->topology_deltas;
     c->reported_order = room->n_order > PAL_WIRE_ORDER_MAX ? room->n_order - PAL_WIRE_ORDER_MAX : 0;
-    pal_session_observe(room->session, true);
+    /* nobody has looked: what the stream holds is the shape of then, and the next cycle has that of now */
+    if (pal_session_observe(room->session, true)) c->sent_cycle = room->stream->cycle;
     if (room->tier_users[c->tier]++ == 0) pal_stream_begin_tier(room->stream, c->tier);
     /* hello names role and tool; refusals follow it */
     pal_err err = PAL_ERR_OK;

@@ -83,7 +83,7 @@ void pal_hub_leave_room(pal_client *c)
     pal_members_leave(&room->members, c->id);
     if (tool >= 0) pal_hub_release_tool(room, tool);
     room->tier_users[c->tier]--;
-    pal_session_observe(room->session, false);
+    (void)pal_session_observe(room->session, false);
     pal_admission_leave(c->hub->admission, &c->grant, pal_loop_now_ns(c->hub->loop));
     c->id = 0;
     pal_hub_members_changed(room);

@@ -140,6 +140,8 @@ void pal_stream_transfer(pal_stream *stream, const pal_stream *before)
 {
     stream->cycle = before->cycle, stream->cycle_ns = before->cycle_ns;
     stream->step_ms = before->step_ms, stream->step_rate_hz = before->step_rate_hz;
+    memcpy(stream->n_step, before->n_step, sizeof stream->n_step);
+    stream->step_sum_s = before->step_sum_s;
     memcpy(stream->component_ms, before->component_ms, sizeof stream->component_ms);
     stream->count = before->count;
     memcpy(stream->haptic_seq, before->haptic_seq, sizeof stream->haptic_seq);
@@ -341,6 +343,16 @@ int pal_stream_devices(const pal_stream *stream, const pal_stream_tool tool[PAL_
     return n;
 }
 
+const double pal_step_bound_s[PAL_STEP_BOUNDS] = {0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.033, 0.066, 0.13};
+
+static void count_step(pal_stream *stream, double s)
+{
+    int k = 0;
+    while (k < PAL_STEP_BOUNDS && s > pal_step_bound_s[k]) k++;
+    stream->n_step[k]++;
+    stream->step_sum_s += s;
+}
+
 bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_STREAM_TIER_COUNT],
                        const pal_stream_tool tool[PAL_TOOL_MAX])
 {
@@ -371,6 +383,7 @@ bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_
         if (stream->component_ms[r] < 1e-6) stream->component_ms[r] = 0;
     }
     stream->step_ms += 0.2 * ((double)frame->step_ns * 1e-6 - stream->step_ms);
+    count_step(stream, 1e-9 * (double)frame->step_ns);
     return true;
 }
 

@@ -38,6 +38,9 @@ typedef struct pal_stream_count { /* totals for metrics */
     uint64_t n_field;
 } pal_stream_count;
 
+enum { PAL_STEP_BOUNDS = 9 };
+extern const double pal_step_bound_s[PAL_STEP_BOUNDS]; /* of the histogram of steps in /metrics */
+
 typedef struct pal_stream {
     pal_session *session;
     const pal_scene *scene;
@@ -52,6 +55,10 @@ typedef struct pal_stream {
     double error_m;
     /* smoothed, for status */
     double component_ms[PAL_FRAME_COMPONENT_MAX], step_ms, step_rate_hz;
+    /* processor time of the steps that were seen: how many took at most each bound and more than the one before, and
+     * the sum, s */
+    uint64_t n_step[PAL_STEP_BOUNDS + 1];
+    double step_sum_s;
     pal_stream_count count;
     /* encoders and their buffer */
     pal_frame_encoder *encoder[PAL_BODY_MAX][PAL_STREAM_TIER_COUNT];

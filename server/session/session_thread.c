@@ -554,9 +554,10 @@ const pal_frame *pal_session_take_frame(pal_session *s)
     return pal_triple_buffer_take(&s->frames);
 }
 
-void pal_session_observe(pal_session *s, bool observes)
+bool pal_session_observe(pal_session *s, bool observes)
 {
-    atomic_fetch_add_explicit(&s->n_observer, observes ? 1 : -1, memory_order_relaxed);
+    const int before = atomic_fetch_add_explicit(&s->n_observer, observes ? 1 : -1, memory_order_relaxed);
+    return observes && before == 0 && s->options.only_observed;
 }
 
 bool pal_session_is_alive(const pal_session *s)

@@ -92,7 +92,13 @@ static void an_order_that_slows_the_session_is_taken_back(void)
     for (int i = 0; i < 120; i++) run(&ada, &eve, 3, 3), run(&ada, &eve, 2, 1);
     CHECK_INT(ada.n_text[PAL_CONTROL_ERROR], 0);
     send(&ada, "material", "\"young_Pa\":8000");
-    run(&ada, &eve, 900, 3);
+    run(&ada, &eve, 250, 3);
+    pal_reply reply;
+    pal_mem_get(transport, "/readyz", &reply);
+    CHECK_INT(reply.status, 503);
+    CHECK(reply.body && !memcmp(reply.body->bytes, "a session runs 3.0 times slower than real time\n", 47));
+    pal_packet_drop(reply.body);
+    run(&ada, &eve, 650, 3);
     CHECK_TEXT(ada.last[PAL_CONTROL_ERROR].error.code, "undone");
     CHECK(strstr(trouble(&ada), "material by Ada was taken back: the simulation ran 3.0 times slower") ==
           trouble(&ada));

@@ -109,6 +109,41 @@ static void late_joiner_sees_the_paused_tissue_as_everybody_does(void)
     end();
 }
 
+/* largest distance of what two clients show, m */
+static double apart_m(const float *a, const float *b, uint32_t n)
+{
+    double max = 0;
+    for (uint32_t i = 0; i < 3 * n; i++) max = fmax(max, fabs((double)a[i] - (double)b[i]));
+    return max;
+}
+
+/* tissue that sags while nobody looks: who comes then sees it as it is, and never as the last one saw it */
+static void newcomer_sees_the_shape_of_now(void)
+{
+    mem_client ada, bob;
+    apart_ns = FRAME_NS;
+    served_begin(&organ.scene, (pal_session_options){.only_observed = true}, (pal_server_options){0});
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    UNTIL(ada.n_frame > 0, &ada, NULL);
+    const uint32_t n = ada.asset->order->n_vertex;
+    float *then = malloc(3 * n * sizeof *then), *first = malloc(3 * n * sizeof *first);
+    memcpy(then, ada.position_m, 3 * n * sizeof *then);
+    mem_end(&ada);
+    for (int i = 0; i < 30; i++) turn(NULL, NULL);
+    mem_join(&bob, transport, "Bob", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_pull(&bob, 1000);
+    CHECK_INT(bob.n_frame, 0); /* nothing rather than the shape of then */
+    UNTIL(bob.n_frame > 0, &bob, NULL);
+    memcpy(first, bob.position_m, 3 * n * sizeof *first);
+    turn(&bob, NULL), turn(&bob, NULL);
+    const double since = apart_m(first, then, n), after = apart_m(bob.position_m, first, n);
+    CHECK(since > 1e-4);
+    CHECK_LE(after, since / 5);
+    free(then), free(first);
+    mem_end(&bob);
+    end();
+}
+
 static void stalled_client_costs_little_and_is_current_within_two_frames(void)
 {
     mem_client fast, slow;
@@ -670,6 +705,7 @@ int main(void)
     RUN(frames_decode_to_the_sessions_positions);
     RUN(newcomer_gets_hello_members_frame_and_tools_in_this_order);
     RUN(late_joiner_sees_the_paused_tissue_as_everybody_does);
+    RUN(newcomer_sees_the_shape_of_now);
     RUN(stalled_client_costs_little_and_is_current_within_two_frames);
     RUN(without_acknowledgement_frames_stop_and_control_goes_on);
     RUN(slow_client_gets_coarser_frames_and_finer_ones_when_it_keeps_up);

@@ -266,6 +266,27 @@ static void pages_tell_health_sessions_and_figures(void)
     CHECK(n > 0 && body[n - 1] == '\n');
 }
 
+/* a histogram's last bucket is its count, and no bucket is smaller than the one before */
+static void steps_are_counted_by_their_time(void)
+{
+    static char body[40000];
+    size_t n = 0;
+    unsigned long long before = 0, bucket = 0, count = 0;
+    int n_bucket = 0;
+    CHECK_INT(get("/metrics", "", body, sizeof body - 1, &n), 200);
+    body[n] = 0;
+    for (char *at = body; (at = strstr(at, "by_session_bucket{session=\"0\",le=")); at++, n_bucket++) {
+        CHECK_INT(sscanf(strchr(at, '}'), "} %llu", &bucket), 1);
+        CHECK(bucket >= before);
+        before = bucket;
+    }
+    CHECK_INT(n_bucket, PAL_STEP_BOUNDS + 1);
+    char *at = strstr(body, "by_session_count{session=\"0\"} ");
+    REQUIRE(at);
+    CHECK_INT(sscanf(strchr(at, '}'), "} %llu", &count), 1);
+    CHECK(count > 0 && count == bucket);
+}
+
 static void a_client_sees_the_asset_and_frames_of_it(void)
 {
     static pal_control hello;
@@ -565,6 +586,7 @@ int main(void)
     RUN(one_connection_serves_many_requests);
     RUN(large_file_arrives_whole_at_a_slow_reader);
     RUN(pages_tell_health_sessions_and_figures);
+    RUN(steps_are_counted_by_their_time);
     RUN(a_client_sees_the_asset_and_frames_of_it);
     RUN(bad_messages_are_closed_with_a_code);
     RUN(flood_closes_the_flooder_alone);

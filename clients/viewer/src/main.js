@@ -11,6 +11,7 @@ import { FieldDisplay } from "./field_display.js";
 import { Layout } from "./layout.js";
 import { MembersPanel } from "./members_panel.js";
 import { Messages } from "./messages.js";
+import { withOwnTool } from "./own_tool.js";
 import { PlanPanel } from "./plan_panel.js";
 import { PoseSender } from "./pose_sender.js";
 import { SculptPanel } from "./sculpt_panel.js";
@@ -104,8 +105,9 @@ function draw() {
         }
         for (const body of state.bodies.values()) if (body.colours.blend(now)) stage.dirty = true;
         if (stage.dirty) {
+            marks.drawn = state.tools;
             marks.update(
-                state.tools,
+                withOwnTool(state.tools, state.ownTool, poses.last),
                 (id) => state.members.get(id)?.name ?? "",
                 state.ownTool,
                 MARK_RADIUS * stage.size,

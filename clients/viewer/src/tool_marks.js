@@ -67,7 +67,6 @@ export class ToolMarks {
      * @param {number} radiusLimit smallest drawn radius, m
      */
     update(tools, nameOf, mine, radiusLimit) {
-        this.drawn = tools;
         tools.forEach((tool, i) => {
             const mark = this.mark(i);
             mark.shown = tool.held && !tool.away;

@@ -1,0 +1,13 @@
+// The own tool as it is drawn. Pure.
+
+/** @typedef {import("./wire.js").Tool} Tool */
+
+/**
+ * The own tool stands where the hand is, not where the server last saw it: that is a round trip old.
+ * @param {Tool[]} tools @param {number} own its index, -1 none @param {number[] | null} hand m; null: it is away
+ * @returns {Tool[]}
+ */
+export const withOwnTool = (tools, own, hand) =>
+    hand && tools[own]?.held && !tools[own].away
+        ? tools.map((tool, i) => (i === own ? { ...tool, position: hand } : tool))
+        : tools;
