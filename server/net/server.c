@@ -96,7 +96,8 @@ static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_
      * needs itself */
     const int max_socket = s->address.max_socket = (options->max_clients > 0 ? options->max_clients : PAL_HUB_CLIENTS) +
                                                    PAL_UNJOINED_PLACES + 128 + PAL_HEALTH_SOCKETS;
-    PAL_TRY(pal_loop_create(s->ops->sockets, max_socket, pal_session_clock(session[0]), diag, &s->loop));
+    PAL_TRY(pal_loop_create(s->ops->sockets, max_socket, options->tls_certificate != NULL,
+                            pal_session_clock(session[0]), diag, &s->loop));
     PAL_TRY(pal_hub_create(s->loop, options, s->site, session, n_session, diag, &s->hub));
     pal_hub_events(s->hub, &events);
     return s->ops->open(s->loop, &s->address, &events, diag, &s->transport);

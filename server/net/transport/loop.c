@@ -56,12 +56,13 @@ static void wake_due(lws_sorted_usec_list_t *timer)
     if (loop->events.wake) loop->events.wake(loop->events.user);
 }
 
-static pal_err open_context(pal_loop *loop, int max_socket, pal_diagnostic *diag)
+static pal_err open_context(pal_loop *loop, int max_socket, bool tls, pal_diagnostic *diag)
 {
     struct lws_context_creation_info info;
     memset(&info, 0, sizeof info);
     lws_set_log_level(LLL_ERR | LLL_WARN, lws_line);
-    info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS | LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
+    /* with it every host loads the certificates of all authorities, and only one that speaks TLS frees them */
+    info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS | (tls ? LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT : 0);
     info.port = CONTEXT_PORT_NO_LISTEN_SERVER;
     info.user = loop;
     info.fd_limit_per_thread = (unsigned)max_socket;
@@ -79,13 +80,14 @@ static pal_err open_context(pal_loop *loop, int max_socket, pal_diagnostic *diag
     return PAL_ERR_OK;
 }
 
-pal_err pal_loop_create(bool sockets, int max_socket, const pal_clock *clock, pal_diagnostic *diag, pal_loop **out)
+pal_err pal_loop_create(bool sockets, int max_socket, bool tls, const pal_clock *clock, pal_diagnostic *diag,
+                        pal_loop **out)
 {
     pal_loop *loop = calloc(1, sizeof *loop);
     if (!loop) return PAL_ERR_MEMORY;
     loop->clock = clock;
     if (sockets) {
-        pal_err err = open_context(loop, max_socket, diag);
+        pal_err err = open_context(loop, max_socket, tls, diag);
         if (err) return pal_loop_destroy(loop), err;
         lws_sul_schedule(loop->context, 0, &loop->tick_timer, tick_due, PAL_LOOP_TICK_NS / 1000);
     }

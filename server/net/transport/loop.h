@@ -19,9 +19,10 @@ typedef struct pal_loop_events {
     void *user;
 } pal_loop_events;
 
-/* sockets false: a loop driven by pal_loop_advance; max_socket bounds the descriptors of the context. Borrows the
- * clock, which must be pal_clock_monotonic with sockets. [load] */
-pal_err pal_loop_create(bool sockets, int max_socket, const pal_clock *clock, pal_diagnostic *diag, pal_loop **out);
+/* sockets false: a loop driven by pal_loop_advance; max_socket bounds the descriptors of the context;
+ * tls: its transport speaks TLS. Borrows the clock, which must be pal_clock_monotonic with sockets. [load] */
+pal_err pal_loop_create(bool sockets, int max_socket, bool tls, const pal_clock *clock, pal_diagnostic *diag,
+                        pal_loop **out);
 /* closes every socket; transports then report the last events of their peers and may be closed. [load] */
 void pal_loop_shut(pal_loop *loop);
 void pal_loop_destroy(pal_loop *loop);                               /* after its transports; NULL is fine. [load] */
