@@ -145,11 +145,6 @@ static bool step_on(void *user, const pal_world *world, double fraction)
 /* kill -9 at ten moments of the session that was recorded last, twenty of both: what goes on has the shape, the paint,
  * the material and the place that everything had when the last record reached the disk; grasps and friction begin anew,
  * hence 2 % of the body's size */
-#ifdef __SANITIZE_THREAD__
-#define MOMENTS 1 /* replays have one thread, in which there is nothing for this sanitizer to find */
-#else
-#define MOMENTS 10
-#endif
 static void goes_on_after_a_kill_at_any_moment(void)
 {
     static uint8_t bytes[1 << 22];
@@ -157,7 +152,7 @@ static void goes_on_after_a_kill_at_any_moment(void)
     const size_t n = slurp(path, bytes, sizeof bytes);
     REQUIRE(n > 10000 && n < sizeof bytes);
     static uint32_t seed = 12345;
-    for (int k = 0; k < MOMENTS; k++) {
+    for (int k = 0; k < 10; k++) {
         pal_diagnostic diag = {""};
         pal_replay_report report;
         pal_resume *resume = NULL;
