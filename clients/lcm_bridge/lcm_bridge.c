@@ -37,7 +37,7 @@ struct pal_lcm_bridge {
     pal_lcm_link *lcm;
     pal_link *watcher;
     char server[256], session[PAL_WIRE_NAME_BYTES], organ[PAL_WIRE_TEXT_BYTES];
-    bool named, too_long_reported;
+    bool named;
     pal_wire_topology topology;
     bridge_part part[PAL_WIRE_PART_MAX];
     bridge_tool tool[PAL_WIRE_TOOL_MAX];
@@ -50,14 +50,6 @@ static void bridge_body(pal_lcm_bridge *b, uint32_t index)
 {
     bridge_part *part = &b->part[index];
     part->sent_ns = pal_clock_ns();
-    if (part->n_byte > PAL_LCM_DATAGRAM_MAX) {
-        b->count.n_frame_dropped++;
-        if (!b->too_long_reported)
-            pal_log(PAL_LOG_WARN, "lcm_frame", "frames of part %u have %zu bytes, more than a datagram of %d: dropped",
-                    index, part->n_byte, PAL_LCM_DATAGRAM_MAX);
-        b->too_long_reported = true;
-        return;
-    }
     const palpate_body_frame_t frame = {.utime = (int64_t)part->head.sim_time_us,
                                         .epoch = (int32_t)part->head.epoch,
                                         .seq = (int32_t)part->head.seq,
@@ -66,7 +58,9 @@ static void bridge_body(pal_lcm_bridge *b, uint32_t index)
                                         .cycle = (int32_t)part->head.cycle,
                                         .size = (int32_t)part->n_byte,
                                         .payload = part->bytes};
-    if (!pal_lcm_link_publish(b->lcm, b->session, "BODY", (int)index, palpate_body_frame_t_get_type_info(), &frame))
+    if (pal_lcm_link_publish(b->lcm, b->session, "BODY", (int)index, palpate_body_frame_t_get_type_info(), &frame))
+        b->count.n_frame_dropped++;
+    else
         b->count.n_frame++;
 }
 

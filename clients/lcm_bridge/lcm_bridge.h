@@ -4,8 +4,9 @@
  * PALPATE1/<session>/TOOL/<n> gets a trainee member of its own that takes tool n, passes the newest state on as POSE
  * (at most 245 a second) and brings HAPTIC back as HMODEL/<n>; after 5 s of silence it gives the tool back.
  * Types: lcmtypes/. Out:
- *   - BODY/<part>, body_frame_t: the FRAME message byte for byte, one datagram. Repeated after 1 s without change, so
- *     that a late listener sees a part at rest. Longer than 65,000 bytes: dropped, counted, one warning.
+ *   - BODY/<part>, body_frame_t: the FRAME message byte for byte. Repeated after 1 s without change, so that a late
+ *     listener sees a part at rest. Longer than a datagram: in fragments, of which none may be lost, so a listener's
+ *     receive buffer must hold the frame.
  *   - STATUS, session_status_t: with every status message of the server, 1 Hz without a server.
  *   - HMODEL/<n>, haptic_model_t.
  * In: TOOL/<n>, tool_state_t: length walk, then version, range and finite numbers, increasing seq.

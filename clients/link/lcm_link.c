@@ -29,7 +29,8 @@ struct pal_lcm_link {
     lcm_t *lcm;
     int n_subscriber;
     lcm_subscriber subscriber[LCM_SUBSCRIPTIONS];
-    uint8_t *buffer; /* of publish  [PAL_LCM_DATAGRAM_MAX + 512] */
+    uint8_t *buffer; /* of publish [n_buffer] */
+    int n_buffer;
 };
 
 /* is there a route to the group? connecting a datagram socket sends nothing and tells */
@@ -144,8 +145,8 @@ pal_err pal_lcm_link_open(pal_link_loop *loop, const char *url, const pal_lcm_ev
 {
     pal_lcm_link *link = calloc(1, sizeof *link);
     if (!link) return PAL_ERR_MEMORY;
-    *link = (pal_lcm_link){.buffer = malloc(PAL_LCM_DATAGRAM_MAX + 512), .events = events, .user = user};
-    pal_err err = link->buffer ? lcm_url(link->url, url, &link->memory, diag) : PAL_ERR_MEMORY;
+    *link = (pal_lcm_link){.events = events, .user = user};
+    pal_err err = lcm_url(link->url, url, &link->memory, diag);
     /* a memory queue belongs to its caller's own loop of calls */
     link->loop = link->memory ? NULL : loop;
     if (!err && link->loop && !pal_link_add_timer(loop, LCM_RETRY_S * 1000000ull, lcm_retry, link))
@@ -184,7 +185,12 @@ pal_err pal_lcm_link_publish(pal_lcm_link *link, const char *session, const char
     char channel[PAL_LCM_CHANNEL_MAX + 1];
     if (!link->lcm) return PAL_ERR_STATE;
     const int wanted = type->encoded_size(message);
-    if (wanted < 0 || wanted > PAL_LCM_DATAGRAM_MAX + 512 - 128) return PAL_ERR_REFUSED;
+    if (wanted < 0) return PAL_ERR_REFUSED;
+    if (wanted > link->n_buffer) {
+        uint8_t *grown = realloc(link->buffer, (size_t)wanted);
+        if (!grown) return PAL_ERR_MEMORY;
+        link->buffer = grown, link->n_buffer = wanted;
+    }
     const int n_byte = type->encode(link->buffer, 0, wanted, message);
     if (n_byte < 0) return PAL_ERR_REFUSED;
     pal_lcm_channel(channel, session, what, n);

@@ -12,10 +12,9 @@
 
 #include <stddef.h>
 
-#define PAL_LCM_VERSION      1
-#define PAL_LCM_PREFIX       "PALPATE1"
-#define PAL_LCM_CHANNEL_MAX  63
-#define PAL_LCM_DATAGRAM_MAX 65000 /* largest payload, bytes, that fits one datagram with its envelope */
+#define PAL_LCM_VERSION     1
+#define PAL_LCM_PREFIX      "PALPATE1"
+#define PAL_LCM_CHANNEL_MAX 63
 
 typedef struct pal_lcm_link pal_lcm_link;
 
@@ -34,8 +33,8 @@ void pal_lcm_link_close(pal_lcm_link *link); /* after the loop is destroyed; NUL
 
 /* channel: an LCM regular expression, kept when the bus reopens; at most 8. type: expected by the length check. */
 pal_err pal_lcm_link_subscribe(pal_lcm_link *link, const char *channel, const lcm_type_info_t *type);
-/* encodes by type and publishes on the channel of pal_lcm_channel; STATE: the bus is not up; REFUSED: exceeds a
- * datagram; IO */
+/* Encodes by type and publishes on the channel of pal_lcm_channel; a message longer than a datagram goes as fragments,
+ * which LCM joins. STATE: the bus is not up; REFUSED: the message has no encoding; MEMORY; IO */
 pal_err pal_lcm_link_publish(pal_lcm_link *link, const char *session, const char *what, int n,
                              const lcm_type_info_t *type, const void *message);
 /* delivers messages of memq; every other bus delivers by itself */

@@ -325,11 +325,39 @@ static void states_of_many_tools_come_through_the_memory_bus(void)
     pal_lcm_link_handle(link);
     CHECK_INT(refused, 1);
     CHECK_INT(heard, 8);
-    /* longer than a datagram */
-    static uint8_t payload[70000];
-    const palpate_body_frame_t frame = {.size = 70000, .payload = payload};
-    CHECK_INT(pal_lcm_link_publish(link, "main", "BODY", 0, palpate_body_frame_t_get_type_info(), &frame),
-              PAL_ERR_REFUSED);
+    pal_lcm_link_close(link);
+}
+
+static size_t n_byte_heard;
+static void on_frame(void *user, const char *channel, const void *bytes, size_t n_byte)
+{
+    (void)user, (void)channel;
+    palpate_body_frame_t frame;
+    if (palpate_body_frame_t_decode(bytes, 0, (int)n_byte, &frame) < 0) return;
+    bool same = true;
+    for (int i = 0; i < frame.size; i++) same &= frame.payload[i] == (uint8_t)(i % 251);
+    n_byte_heard = same ? (size_t)frame.size : 0;
+    palpate_body_frame_t_decode_cleanup(&frame);
+}
+
+/* one datagram holds 65,507 bytes */
+static void frames_come_whole_whatever_their_size(void)
+{
+    static const pal_lcm_events events = {on_frame, NULL};
+    static uint8_t payload[1000000];
+    const int size[] = {1000, 1000000, 65000, 70000, 0};
+    pal_lcm_link *link = NULL;
+    for (int i = 0; i < 1000000; i++) payload[i] = (uint8_t)(i % 251);
+    REQUIRE(pal_lcm_link_open(NULL, "memq://", &events, NULL, NULL, &link) == PAL_ERR_OK);
+    pal_lcm_link_subscribe(link, "PALPATE1/.*/BODY/.*", palpate_body_frame_t_get_type_info());
+    for (size_t k = 0; k < sizeof size / sizeof *size; k++) {
+        const palpate_body_frame_t frame = {.size = size[k], .payload = payload};
+        n_byte_heard = 1;
+        CHECK_INT(pal_lcm_link_publish(link, "main", "BODY", 0, palpate_body_frame_t_get_type_info(), &frame),
+                  PAL_ERR_OK);
+        pal_lcm_link_handle(link);
+        CHECK_INT(n_byte_heard, size[k]);
+    }
     pal_lcm_link_close(link);
 }
 
@@ -375,6 +403,7 @@ int main(void)
     RUN(pose_survives_the_way_to_lcm_and_back);
     RUN(haptic_model_survives_the_way_to_lcm_and_back);
     RUN(states_of_many_tools_come_through_the_memory_bus);
+    RUN(frames_come_whole_whatever_their_size);
     RUN(channels_are_named_and_read_back_exactly);
     RUN(refuses_addresses_that_are_not_a_bus);
     return check_report();
