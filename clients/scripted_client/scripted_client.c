@@ -2,6 +2,7 @@
 #include "protocol/field_codec.h"
 #include "server/base/clock.h"
 #include "server/base/heap.h"
+#include "server/base/log.h"
 #include "server/base/vec3.h"
 
 #include <stdarg.h>
@@ -465,6 +466,7 @@ static void client_on_control(void *user, const pal_control *c)
         t->reshaped = true;
         client_parts(t, c->topology.part, c->topology.n_part);
     }
+    if (c->type == PAL_CONTROL_ERROR && !t->asked) pal_log(PAL_LOG_WARN, "server", "%s", c->error.text);
     if (c->type == PAL_CONTROL_ANSWER || c->type == PAL_CONTROL_ERROR) client_answered(t, c);
 }
 
