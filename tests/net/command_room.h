@@ -1,7 +1,7 @@
 /* A session served inside the process, and clients that give it orders and wait for answers: for the tests of switches.
  */
-#ifndef TESTS_NET_ORDER_ROOM_H
-#define TESTS_NET_ORDER_ROOM_H
+#ifndef TESTS_NET_COMMAND_ROOM_H
+#define TESTS_NET_COMMAND_ROOM_H
 #include "protocol/asset.h"
 #include "tests/net/server_fixture.h"
 
