@@ -366,6 +366,7 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
         room->hub = hub;
         room->session = session[i];
         room->step_s = scene->step_s;
+        pal_hub_accept_load(room);
         pal_members_init(&room->members, scene->n_tool);
         if (options->open) room->members.rights = pal_rights_named("") & ~(1u << PAL_RIGHT_COMPONENT);
         if (options->study && options->study[i].n > 0) room->study = options->study[i];

@@ -87,9 +87,10 @@ typedef struct pal_hub_order {
     uint64_t at_ns;
 } pal_hub_order;
 
-/* how to take back the last order that may have made the session slow; kind NONE: there is none */
+/* how to take back an order that may have made the session slow */
+enum { PAL_UNDO_ORDERS = 8 };
 typedef struct pal_hub_undo {
-    enum { PAL_UNDO_NONE, PAL_UNDO_COMMAND, PAL_UNDO_SWITCH, PAL_UNDO_EDIT } kind;
+    enum { PAL_UNDO_COMMAND, PAL_UNDO_SWITCH, PAL_UNDO_EDIT } kind;
     pal_command command;             /* COMMAND: the former material or state of a component */
     pal_configuration configuration; /* SWITCH: the former one */
     int body, member;
@@ -103,6 +104,8 @@ typedef struct pal_hub_quality {
     int n_lowered;
     pal_configuration was[PAL_QUALITY_LEVELS]; /* configurations before each change, the oldest first */
     double cost[PAL_QUALITY_LEVELS];           /* cost of each over that of the cheaper one that replaced it */
+    int n_fall;                                /* times that quality has risen, to fall again */
+    bool refused;                              /* the session could not be changed: until a member changes it */
     uint64_t slow_ns, spare_ns;                /* since when the session is slow, or has time to spare; 0: it is not */
 } pal_hub_quality;
 
@@ -127,9 +130,12 @@ typedef struct pal_hub_room {
     uint32_t moved_buttons[PAL_TOOL_MAX];
     uint64_t moved_ns[PAL_TOOL_MAX];
     struct pal_hub_jobs *jobs; /* NULL until a command needs it */
-    pal_hub_undo undo;
+    double max_load; /* time of a step over that of its length, at most, as predicted, after what a trainee orders */
+    pal_hub_undo undo[PAL_UNDO_ORDERS]; /* the oldest first [n_undo] */
+    int n_undo;
     pal_hub_quality quality;
-    uint64_t slow_ns; /* since when the session is much slower than real time; 0: it is not */
+    uint64_t slow_ns;   /* since when the session is much slower than real time; 0: it is not */
+    uint64_t undone_ns; /* when an order was last taken back */
     /* steps without output for lack of observers; tick and OUTPUT runs at the last count */
     uint64_t n_unobserved, seen_tick, seen_output;
     bool was_unobserved;                   /* no observers at the last count */

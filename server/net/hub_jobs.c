@@ -7,8 +7,8 @@
 #include "server/net/hub_plan.h"
 #include "server/net/hub_undo.h"
 #include "server/net/tuning.h"
-#include "server/solve/preflight.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,8 +28,8 @@ typedef struct pending_job {
 
 typedef struct pal_hub_jobs pal_hub_jobs;
 struct pal_hub_jobs {
-    pal_loop *loop;                        /* woken when a job is done */
-    pending_job pending[PAL_JOBS_PENDING]; /* oldest first */
+    pal_loop *loop;                            /* woken when a job is done */
+    pending_job pending[PAL_JOBS_PENDING + 1]; /* the server's own, then the others, oldest first */
     int n_pending;
     pending_job current; /* in progress, no longer pending */
     bool busy;           /* a job is in progress or done */
@@ -45,13 +45,11 @@ struct pal_hub_jobs {
 
 static pal_err check_cost(pal_job *job, const pal_scene *scene)
 {
-    const double step_ms = 1e3 * scene->step_s;
-    if (job->may_be_slow) return PAL_ERR_OK;
-    const double ms = pal_step_cost_ms(scene, pal_session_held_world(job->made.session));
-    if (!(ms > step_ms) || ms <= PAL_DEARER * job->now_ms) return PAL_ERR_OK;
+    const double load = pal_session_predicted_load(job->made.session), step_ms = 1e3 * scene->step_s;
+    if (!(load > job->max_load)) return PAL_ERR_OK;
     return pal_diagnostic_set(&job->diag, PAL_ERR_BUDGET,
-                              "a step would take about %.3g ms of its %.3g ms; an instructor may order it", ms,
-                              step_ms);
+                              "a step would take about %.3g ms of its %.3g ms; an instructor may order it",
+                              load * step_ms, step_ms);
 }
 
 static void make(pal_job *job)
@@ -251,12 +249,13 @@ static void send_topology(pal_hub_room *room)
 static void account(pal_hub_room *room, pal_client *c, const pal_job *job)
 {
     room->quality.n_lowered += job->quality;
+    if (isinf(job->max_load)) pal_hub_accept_load(room);
     if (!c) return;
     pal_hub_undo *undo = pal_hub_undo_begin(c, job->verb);
     undo->kind = job->type->switches ? PAL_UNDO_SWITCH : PAL_UNDO_EDIT;
     undo->body = job->body;
     undo->configuration = job->before;
-    room->quality.n_lowered = 0; /* somebody has chosen */
+    room->quality = (pal_hub_quality){.n_lowered = 0}; /* somebody has chosen */
 }
 
 /* the time that a member's jobs may not take for some while */
@@ -277,6 +276,7 @@ static void finish(pal_hub_jobs *s, pal_job *job)
         account(room, c, job);
         if (c) job->type->answer(c, job);
     } else if (!c && s->current.own) {
+        room->quality.refused |= job->quality != 0;
         pal_hub_notice(room, "refused", "%s: %s", job->verb,
                        job->diag.text[0] ? job->diag.text : pal_err_text(job->err));
     } else if (c) {
@@ -310,8 +310,7 @@ static void begin_next(pal_hub_jobs *s)
                        .session = c->room->session,
                        .error_m = c->hub->error_m,
                        .asked_ns = s->current.asked_ns,
-                       .now_ms = c->room->stream->step_ms,
-                       .may_be_slow = s->current.own || pal_hub_is_instructor(c),
+                       .max_load = s->current.own || pal_hub_is_instructor(c) ? INFINITY : c->room->max_load,
                        .quality = s->current.quality,
                        .configuration = s->current.to};
         memcpy(job.verb, s->current.command.verb, sizeof job.verb);
@@ -339,7 +338,7 @@ bool pal_hub_jobs_enqueue(pal_client *c, const pal_job_type *type, const pal_wir
     int n_own = 0;
     if (!s) return pal_hub_refuse(c, "refused", "%s: %s", command->verb, pal_err_text(PAL_ERR_MEMORY));
     for (int k = 0; k < s->n_pending; k++) n_own += s->pending[k].member == c->id;
-    if (n_own >= PAL_JOBS_OF_MEMBER || s->n_pending == PAL_JOBS_PENDING)
+    if (n_own >= PAL_JOBS_OF_MEMBER || s->n_pending >= PAL_JOBS_PENDING)
         return pal_hub_refuse(c, "busy", "%s: %d commands wait already", command->verb, n_own ? n_own : s->n_pending);
     if (c->jobs_until_ns > now + PAL_JOBS_TIME_NS && !pal_hub_is_instructor(c))
         return pal_hub_refuse(c, "busy", "%s: your commands have taken much time: wait %.0f s", command->verb,
@@ -355,8 +354,9 @@ bool pal_hub_jobs_enqueue_own(pal_hub_room *room, const pal_job_type *type, cons
 {
     pal_hub_jobs *s = jobs_of(room);
     const pal_client *any = pal_hub_next_member(room, NULL);
-    if (!s || !any || s->n_pending == PAL_JOBS_PENDING) return false;
-    pending_job *job = &s->pending[s->n_pending++];
+    if (!s || !any || pal_hub_jobs_own(room)) return false;
+    pending_job *job = s->pending;
+    memmove(job + 1, job, sizeof *job * (size_t)s->n_pending++);
     *job = (pending_job){.room = room,
                          .member = any->id,
                          .asked_ns = pal_loop_now_ns(room->hub->loop),
@@ -369,9 +369,20 @@ bool pal_hub_jobs_enqueue_own(pal_hub_room *room, const pal_job_type *type, cons
     return true;
 }
 
+void pal_hub_accept_load(pal_hub_room *room)
+{
+    room->max_load = fmax(1, PAL_DEARER * pal_session_predicted_load(room->session));
+}
+
 bool pal_hub_jobs_busy(const pal_hub_room *room)
 {
     return room->jobs && (room->jobs->busy || room->jobs->n_pending > 0);
+}
+
+bool pal_hub_jobs_own(const pal_hub_room *room)
+{
+    const pal_hub_jobs *s = room->jobs;
+    return s && ((s->busy && s->current.own) || (s->n_pending > 0 && s->pending[0].own));
 }
 
 void pal_hub_jobs_update(pal_hub_room *room)

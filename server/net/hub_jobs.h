@@ -4,8 +4,9 @@
  * transfers its state, while other sessions and the loop continue, and frees what was replaced. One job of a session at
  * a time.
  *
- * What a trainee asks for is costed: a step of the next world must fit into its time, or take no longer than now. Each
- * member's jobs may take half of the time of the thread. Thread: [net] unless noted. */
+ * What a trainee asks for is costed: a step of the next world must fit into its time, or take no more of it than the
+ * scene as opened, or as an instructor has left it. Each member's jobs may take half of the time of the thread. Thread:
+ * [net] unless noted. */
 #ifndef PAL_NET_HUB_JOBS_H
 #define PAL_NET_HUB_JOBS_H
 #include "server/net/hub_core.h"
@@ -45,8 +46,7 @@ struct pal_job {
     char verb[32];
     uint64_t asked_ns, made_ns;
     uint64_t work_ns; /* processor time of its making */
-    double now_ms;    /* measured time of a step now */
-    bool may_be_slow; /* asked for by an instructor or the server: not costed */
+    double max_load;  /* of the next session as predicted, beyond which it is refused */
     int quality;      /* of pal_hub_switch_to; 0: a member's or none */
     /* edit */
     pal_sculptor *sculptor;
@@ -67,11 +67,14 @@ struct pal_job {
 
 /* appends a command; false: the queue is full, the member's time is used up, or out of memory: an error was sent */
 bool pal_hub_jobs_enqueue(pal_client *client, const pal_job_type *type, const pal_wire_command *command);
-/* the same for the server itself, in the name of any member, who gets no answer; false: not now. to: the configuration
- * of a switch; NULL: none */
+/* the same for the server itself, one at a time and before what waits, in the name of any member, who gets no answer;
+ * false: not now. to: the configuration of a switch; NULL: none */
 bool pal_hub_jobs_enqueue_own(pal_hub_room *room, const pal_job_type *type, const pal_wire_command *command,
                               const pal_configuration *to, int quality);
+/* what the session costs now is what trainees may have; called when it is opened, and after an instructor's job */
+void pal_hub_accept_load(pal_hub_room *room);
 bool pal_hub_jobs_busy(const pal_hub_room *room); /* a job is in progress or waits */
+bool pal_hub_jobs_own(const pal_hub_room *room);  /* so is one of the server itself */
 void pal_hub_jobs_update(pal_hub_room *room); /* commits and answers the finished job, and starts the next command */
 void pal_hub_jobs_end(pal_hub_room *room);    /* waits for the job in progress and frees it; the thread ends */
 #endif

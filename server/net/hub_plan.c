@@ -98,17 +98,16 @@ void pal_hub_world_answer(pal_client *c)
     if (!c->answer_until_ns || !f) return;
     bool refused = f->n_refused > c->answer_refused;
     if (refused) pal_session_last_diagnostic(c->room->session, &diag);
-    if (diag.text[0]) {
-        pal_hub_refuse(c, "refused", "%s: %s", c->answer_verb, diag.text);
-        c->room->undo.kind = PAL_UNDO_NONE; /* nothing was done */
-    }
+    if (diag.text[0]) pal_hub_refuse(c, "refused", "%s: %s", c->answer_verb, diag.text);
     if (refused || pal_loop_now_ns(c->hub->loop) > c->answer_until_ns) c->answer_until_ns = 0;
 }
 
 bool pal_hub_run_component(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
     double part = pal_hub_arg(command, "part", -1);
-    pal_command order = {.kind = PAL_COMMAND_COMPONENT, .wanted = pal_hub_arg(command, "enabled", 0) != 0};
+    pal_command order = {.kind = PAL_COMMAND_COMPONENT,
+                         .wanted = pal_hub_arg(command, "enabled", 0) != 0,
+                         .in_time = !pal_hub_is_instructor(c)};
     if (!(part >= 0 && part < c->room->stream->n_part))
         return pal_hub_refuse(c, "args", "component: part %g, wanted 0 to %d", part, c->room->stream->n_part - 1);
     if (strlen(command->target) >= sizeof order.component)
@@ -117,7 +116,7 @@ bool pal_hub_run_component(pal_client *c, const pal_verb *verb, const pal_wire_c
     strcpy(order.component, command->target);
     if (!pal_hub_session_command(c, verb->name, &order)) return false;
     pal_hub_await_answer(c, verb->name);
-    order.wanted = !order.wanted;
+    order.wanted = !order.wanted, order.in_time = false;
     pal_hub_undo_by_command(c, verb->name, &order);
     return true;
 }

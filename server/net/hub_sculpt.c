@@ -191,9 +191,10 @@ static const pal_job_type edit_job = {.read = read_edit,
                                       .commit = commit_edit,
                                       .answer = answer_edit};
 
-bool pal_hub_undo_edit(pal_hub_room *room, int body)
+bool pal_hub_undo_edit(pal_hub_room *room, int body, bool redo)
 {
-    pal_wire_command command = {.verb = "undo"};
+    pal_wire_command command = {.n_arg = 0};
+    strcpy(command.verb, redo ? "redo" : "undo");
     snprintf(command.target, sizeof command.target, "%s", pal_session_scene(room->session)->body[body].name);
     return pal_hub_jobs_enqueue_own(room, &edit_job, &command, NULL, 0);
 }

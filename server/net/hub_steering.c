@@ -40,11 +40,11 @@ bool pal_hub_run_material(pal_client *c, const pal_verb *verb, const pal_wire_co
     m.poisson = pal_hub_arg(command, "poisson", m.poisson);
     m.density_kg_m3 = pal_hub_arg(command, "density_kg_m3", m.density_kg_m3);
     m.damping_1_s = pal_hub_arg(command, "damping_1_s", m.damping_1_s);
-    pal_command order = {.kind = PAL_COMMAND_MATERIAL, .body = body, .material = m};
-    if (!pal_hub_is_instructor(c)) order.max_step_ms = 1e3 * pal_session_scene(c->room->session)->step_s;
+    pal_command order = {
+        .kind = PAL_COMMAND_MATERIAL, .body = body, .material = m, .in_time = !pal_hub_is_instructor(c)};
     if (!pal_hub_session_command(c, verb->name, &order)) return false;
     pal_hub_await_answer(c, verb->name);
-    order.material = before, order.max_step_ms = 0;
+    order.material = before, order.in_time = false;
     pal_hub_undo_by_command(c, verb->name, &order);
     return true;
 }

@@ -6,5 +6,5 @@
 /* Gives a body a configuration, whatever it costs; quality: 1 lowers it, -1 restores it, as the room then counts, 0:
  * neither. false: it cannot be asked for now */
 bool pal_hub_switch_to(pal_hub_room *room, int body, const pal_configuration *to, int quality);
-bool pal_hub_undo_edit(pal_hub_room *room, int body); /* undoes the last edit of a body */
+bool pal_hub_undo_edit(pal_hub_room *room, int body, bool redo); /* undoes the last edit of a body, or repeats it */
 #endif

@@ -2,21 +2,34 @@
 
 #include "server/base/log.h"
 #include "server/net/hub_peers.h"
+#include "server/net/tuning.h"
 
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 
 pal_hub_undo *pal_hub_undo_begin(pal_client *c, const char *verb)
 {
-    pal_hub_undo *undo = &c->room->undo;
+    pal_hub_room *room = c->room;
+    if (room->n_undo == PAL_UNDO_ORDERS)
+        memmove(room->undo, room->undo + 1, sizeof *room->undo * (size_t)--room->n_undo);
+    pal_hub_undo *undo = &room->undo[room->n_undo++];
     *undo = (pal_hub_undo){.member = c->id, .at_ns = pal_loop_now_ns(c->hub->loop)};
     snprintf(undo->verb, sizeof undo->verb, "%s", verb);
-    snprintf(undo->name, sizeof undo->name, "%s", pal_members_find(&c->room->members, c->id)->name);
+    snprintf(undo->name, sizeof undo->name, "%s", pal_members_find(&room->members, c->id)->name);
     return undo;
 }
 
 void pal_hub_undo_by_command(pal_client *c, const char *verb, const pal_command *command)
 {
+    const uint64_t now = pal_loop_now_ns(c->hub->loop);
+    pal_hub_undo *last = c->room->n_undo > 0 ? &c->room->undo[c->room->n_undo - 1] : NULL;
+    if (last && last->kind == PAL_UNDO_COMMAND && last->member == c->id && now < last->at_ns + PAL_SLOW_NS &&
+        last->command.kind == command->kind && last->command.body == command->body &&
+        !strcmp(last->command.component, command->component)) {
+        last->at_ns = now;
+        return;
+    }
     pal_hub_undo *undo = pal_hub_undo_begin(c, verb);
     undo->kind = PAL_UNDO_COMMAND;
     undo->command = *command;

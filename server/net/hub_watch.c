@@ -17,18 +17,39 @@ static uint64_t held_for(bool holds, uint64_t *since_ns, uint64_t now_ns)
     return holds ? now_ns - *since_ns : 0;
 }
 
-/* ---- the last order ---- */
+/* ---- the last orders ---- */
 
-static void take_back(pal_hub_room *room, double slowdown)
+/* is everything as it was before the order? */
+static bool is_undone(const pal_hub_room *room, const pal_hub_undo *undo)
 {
-    const pal_hub_undo undo = room->undo;
+    const pal_command *to = &undo->command;
+    const pal_frame *f = room->stream->frame;
+    pal_material m;
+    bool enabled = false;
+    if (undo->kind != PAL_UNDO_COMMAND) return false;
+    pal_session_material(room->session, to->body, &m);
+    if (to->kind == PAL_COMMAND_MATERIAL) return !memcmp(&m, &to->material, sizeof m);
+    for (int r = 0; f && r < f->n_row; r++)
+        enabled |= f->component_body[r] == to->body && !strcmp(f->component_name[r], to->component);
+    return enabled == to->wanted;
+}
+
+/* Takes back the newest order that was given from since_ns to until_ns, passing over those that have changed nothing,
+ * as the session refused them. false: there is none */
+static bool take_back(pal_hub_room *room, uint64_t since_ns, uint64_t until_ns, double slowdown)
+{
+    int k = room->n_undo - 1;
+    while (k >= 0 && (is_undone(room, &room->undo[k]) || room->undo[k].at_ns >= until_ns)) k--;
+    if (k < 0 || room->undo[k].at_ns < since_ns) return false;
+    const pal_hub_undo undo = room->undo[k];
+    memmove(room->undo + k, room->undo + k + 1, sizeof undo * (size_t)(--room->n_undo - k));
     bool done = false;
-    room->undo.kind = PAL_UNDO_NONE;
     if (undo.kind == PAL_UNDO_COMMAND) done = pal_session_command(room->session, &undo.command) == PAL_ERR_OK;
     if (undo.kind == PAL_UNDO_SWITCH) done = pal_hub_switch_to(room, undo.body, &undo.configuration, 0);
-    if (undo.kind == PAL_UNDO_EDIT) done = pal_hub_undo_edit(room, undo.body);
+    if (undo.kind == PAL_UNDO_EDIT) done = pal_hub_undo_edit(room, undo.body, !strcmp(undo.verb, "undo"));
     pal_hub_notice(room, "undone", "%s by %s %s: the simulation ran %.1f times slower than real time", undo.verb,
                    undo.name, done ? "was taken back" : "could not be taken back", slowdown);
+    return true;
 }
 
 /* ---- quality ---- */
@@ -42,7 +63,7 @@ static bool find_cheaper(const pal_hub_room *room, int body, pal_configuration *
     double best_ms = 0;
     for (int i = 0; i < room->study.n && isfinite(now_ms); i++) {
         const pal_measured_configuration *point = &room->study.configuration[i];
-        if (!(point->ms > best_ms) || !(point->ms <= PAL_CHEAPER * now_ms)) continue;
+        if (!point->front || !(point->ms > best_ms) || !(point->ms <= PAL_CHEAPER * now_ms)) continue;
         best_ms = point->ms;
         *to = point->configuration;
     }
@@ -59,13 +80,17 @@ static void keep_real_time(pal_hub_room *room, const pal_frame *f, uint64_t now)
 {
     pal_hub_quality *q = &room->quality;
     const int body = room->study.configuration ? room->study.body : 0;
-    const double step_ms = room->stream->step_ms, spare_ms = 1e3 * PAL_SPARE * pal_session_scene(room->session)->step_s;
+    /* under load, also while the body sleeps */
+    const double load = fmax(1e-3 * room->stream->step_ms / pal_session_scene(room->session)->step_s,
+                             pal_session_predicted_load(room->session));
     const double before = q->n_lowered > 0 ? q->cost[q->n_lowered - 1] : INFINITY;
+    /* each fall makes the next rise later, so that quality does not oscillate where others keep the machine busy */
+    const uint64_t wait_ns = PAL_QUALITY_SPARE_NS << (q->n_fall < PAL_QUALITY_FALLS ? q->n_fall : PAL_QUALITY_FALLS);
     char text[PAL_CONFIGURATION_TEXT];
     pal_configuration to;
     double ratio;
-    const bool slow = f->slowdown > PAL_SLOW_MIN, busy = pal_hub_jobs_busy(room);
-    const bool spare = !slow && q->n_lowered > 0 && step_ms > 0 && step_ms * before < spare_ms;
+    const bool slow = f->slowdown > PAL_SLOW_MIN, busy = pal_hub_jobs_busy(room) || q->refused;
+    const bool spare = !slow && q->n_lowered > 0 && load * before < PAL_SPARE;
     if (held_for(slow && !busy, &q->slow_ns, now) > PAL_QUALITY_SLOW_NS && q->n_lowered < PAL_QUALITY_LEVELS) {
         q->slow_ns = 0;
         if (!find_cheaper(room, body, &to, &ratio)) return;
@@ -75,8 +100,9 @@ static void keep_real_time(pal_hub_room *room, const pal_frame *f, uint64_t now)
             pal_hub_notice(room, "quality", "%.1f times slower than real time: going on with %s", f->slowdown,
                            pal_configuration_text(&to, text));
     }
-    if (held_for(spare && !busy, &q->spare_ns, now) > PAL_QUALITY_SPARE_NS) {
+    if (held_for(spare && !busy, &q->spare_ns, now) > wait_ns) {
         q->spare_ns = 0;
+        q->n_fall++;
         to = q->was[q->n_lowered - 1];
         if (pal_hub_switch_to(room, body, &to, -1))
             pal_hub_notice(room, "quality", "there is time to spare: back to %s", pal_configuration_text(&to, text));
@@ -87,14 +113,15 @@ void pal_hub_watch_pace(pal_hub_room *room)
 {
     const pal_frame *f = room->stream->frame;
     const uint64_t now = pal_loop_now_ns(room->hub->loop);
-    const pal_hub_undo *undo = &room->undo;
     if (!f || f->paused) {
         room->slow_ns = room->quality.slow_ns = room->quality.spare_ns = 0;
         return;
     }
+    /* one order after the other, each with the time to show that it was the one */
     const uint64_t slow_ns = held_for(f->slowdown > PAL_SLOW_MAX, &room->slow_ns, now);
-    const bool by_order = undo->kind != PAL_UNDO_NONE && undo->at_ns < room->slow_ns + PAL_BLAME_NS &&
-                          room->slow_ns < undo->at_ns + PAL_BLAME_NS;
-    if (slow_ns > PAL_SLOW_NS && by_order) take_back(room, f->slowdown);
+    const uint64_t since_ns = room->slow_ns > PAL_BLAME_NS ? room->slow_ns - PAL_BLAME_NS : 0;
+    if (slow_ns > PAL_SLOW_NS && now > room->undone_ns + PAL_SLOW_NS && !pal_hub_jobs_own(room) &&
+        take_back(room, since_ns, room->slow_ns + PAL_BLAME_NS, f->slowdown))
+        room->undone_ns = now;
     if (pal_session_scene(room->session)->keep_real_time) keep_real_time(room, f, now);
 }

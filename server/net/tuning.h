@@ -61,11 +61,11 @@
 #define PAL_JOBS_PENDING   8
 #define PAL_JOBS_OF_MEMBER 4
 #define PAL_JOBS_TIME_NS   5000000000u
-/* a trainee's command may make a step that is too long anyway this much longer: what is cheaper is always allowed, and
- * foreseen times are to a fifth (test_cost_hub) */
-#define PAL_DEARER 1.1
-/* slowdown above which, for so many ns, the last order is taken back; ns within which it must have been given
- * (test_cost_hub) */
+/* a scene that does not fit into its time may become this much dearer by trainees' commands in all: predictions are to
+ * a fifth (test_cost_hub) */
+#define PAL_DEARER 1.25
+/* slowdown above which, for so many ns, the last order is taken back, and after as many more the one before; ns within
+ * which it must have been given. Repeated orders within PAL_SLOW_NS are one (test_cost_hub) */
 #define PAL_SLOW_MAX 2.0
 #define PAL_SLOW_NS  3000000000u
 #define PAL_BLAME_NS 10000000000u
@@ -77,4 +77,6 @@
 #define PAL_CHEAPER          0.8
 #define PAL_SPARE            0.7
 #define PAL_QUALITY_SPARE_NS 20000000000u
+/* rises of quality that double the time before the next: to some minutes (test_cost_hub) */
+#define PAL_QUALITY_FALLS 4
 #endif

@@ -47,7 +47,8 @@ typedef struct pal_command {
     int slot;
     pal_brush brush;
     char component[PAL_NAME];
-    double max_step_ms; /* MATERIAL: refused when a step would take longer, by what sub-steps take now; 0: any */
+    bool in_time; /* MATERIAL, COMPONENT: refused when it needs more sub-steps than before, and a step would be longer
+                     than its time by what sub-steps take now */
 } pal_command;
 
 typedef struct pal_session_options {
@@ -80,8 +81,6 @@ typedef struct pal_session_change {
  * while no other thread closes `before` */
 pal_err pal_session_open_after(const pal_session *before, const pal_scene *scene, pal_diagnostic *diag,
                                pal_session **out);
-/* the world of a session that was opened with hold and has not started. [job] */
-pal_world *pal_session_held_world(pal_session *session);
 /* Replaces the running session `before` with `next`, which was opened with hold, in two phases.
  *
  * transfer_begin stops the thread of before between two steps and transfers subscriptions, disabled components and the
@@ -114,6 +113,9 @@ void pal_session_close(pal_session *session); /* stops and joins the thread; NUL
 int pal_session_record_error(const pal_session *session);
 const pal_scene *pal_session_scene(const pal_session *session); /* [any] */
 const pal_clock *pal_session_clock(const pal_session *session); /* [any] */
+/* time of a step under load as predicted when the session was opened (server/solve/preflight.h) over the time of a
+ * step; NaN: unknown, as of a static solver or a resumed session. [any] */
+double pal_session_predicted_load(const pal_session *session);
 /* The plan at open and the displayed parts; constant while the session lives. Frames name the current components,
  * including those of fields. [any] */
 typedef struct pal_session_outline {

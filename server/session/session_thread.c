@@ -10,6 +10,7 @@
 #include "server/base/vec3.h"
 #include "server/session/resume.h"
 #include "server/session/tuning.h"
+#include "server/solve/preflight.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -159,20 +160,21 @@ static const pal_input_kind record_of[PAL_COMMAND_COUNT] = {[PAL_COMMAND_RESET] 
                                                             [PAL_COMMAND_BRUSH] = PAL_INPUT_BRUSH,
                                                             [PAL_COMMAND_COMPONENT] = PAL_INPUT_COMPONENT};
 
-/* Has a material made the step longer than the command allows? Then the former one comes back, which is recorded as the
- * input that it is, so that a replay makes the same steps */
+/* Has a material or component made the step longer than the command allows? Then the former one comes back, which is
+ * recorded as the input that it is, so that a replay makes the same steps */
 static pal_err check_cost(pal_session *s, const pal_command *command, int n_before, pal_input_record *record,
                           pal_diagnostic *diag)
 {
     const int n_sub = pal_world_rest_substeps(s->world);
-    const double ms = 1e-6 * s->substep_ns * n_sub;
-    if (!(command->max_step_ms > 0) || n_sub <= n_before || ms <= command->max_step_ms) return PAL_ERR_OK;
+    const double ms = 1e-6 * s->substep_ns * n_sub, step_ms = 1e3 * s->scene->step_s;
+    if (!command->in_time || n_sub <= n_before || ms <= step_ms) return PAL_ERR_OK;
     pal_input_log_put(s->log, record);
     record->material = s->material[command->body];
+    record->wanted = !record->wanted;
     PAL_TRY(pal_input_apply(s->world, s->scene, record, diag));
     pal_input_log_put(s->log, record);
     return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "a step would take %.3g ms of its %.3g ms, with %d sub-steps", ms,
-                              1e3 * s->scene->step_s, n_sub);
+                              step_ms, n_sub);
 }
 
 /* records an accepted input, counts a refused one */
@@ -189,7 +191,7 @@ static void apply(pal_session *s, const pal_command *command)
     memcpy(record.component, command->component, sizeof record.component);
     const int n_sub = pal_world_rest_substeps(s->world);
     pal_err err = pal_input_apply(s->world, s->scene, &record, &diag);
-    if (!err && command->kind == PAL_COMMAND_MATERIAL) err = check_cost(s, command, n_sub, &record, &diag);
+    if (!err) err = check_cost(s, command, n_sub, &record, &diag);
     if (err)
         count_refusal(s);
     else
@@ -367,6 +369,8 @@ static pal_err prepare(pal_session *s, pal_diagnostic *diag)
         s->world = pal_resume_take_world(s->options.resume);
     else
         PAL_TRY(pal_world_create(s->scene, diag, &s->world));
+    if (!s->options.resume) s->predicted_ms = pal_step_cost_ms(s->scene, s->world);
+    if (s->predicted_ms > 0) s->substep_ns = 1e6 * s->predicted_ms / pal_world_rest_substeps(s->world);
     pal_err err = copy_plan(s);
     s->command = pal_command_queue_create(N_COMMAND, sizeof(pal_command));
     bool whole = !err && s->command;
@@ -421,6 +425,7 @@ pal_err pal_session_open(const pal_scene *scene, const pal_session_options *opti
     if (!s) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a session");
     pthread_mutex_init(&s->lock, NULL);
     s->scene = scene;
+    s->predicted_ms = NAN;
     if (options) s->options = *options;
     if (!s->options.clock) s->options.clock = &pal_clock_monotonic;
     pal_estimator_set_init(&s->estimators, scene, s->options.clock);
@@ -467,11 +472,6 @@ void pal_session_close(pal_session *s)
     release(s);
 }
 
-pal_world *pal_session_held_world(pal_session *s)
-{
-    return s->world;
-}
-
 /* ---- functions for any thread ---- */
 
 const pal_scene *pal_session_scene(const pal_session *s)
@@ -482,6 +482,11 @@ const pal_scene *pal_session_scene(const pal_session *s)
 int pal_session_record_error(const pal_session *s)
 {
     return pal_input_log_error(s->log);
+}
+
+double pal_session_predicted_load(const pal_session *s)
+{
+    return 1e-3 * s->predicted_ms / s->scene->step_s;
 }
 
 const pal_clock *pal_session_clock(const pal_session *s)

@@ -335,9 +335,15 @@ static double cost_of_body(pal_world *world, double step_s, int b)
 
 double pal_step_cost_ms(const pal_scene *scene, pal_world *world)
 {
+    uint64_t n_output[PAL_BODY_MAX];
     double ms = 0;
-    for (int b = 0; b < scene->n_body; b++) ms += cost_of_body(world, scene->step_s, b);
-    pal_world_reset(world); /* forces leave traces in what components keep between steps */
+    for (int b = 0; b < scene->n_body; b++) {
+        n_output[b] = pal_world_body(world, b)->display.n_output;
+        ms += cost_of_body(world, scene->step_s, b);
+    }
+    /* forces leave traces in what components keep between steps; what is shown is as before */
+    pal_world_reset(world);
+    for (int b = 0; b < scene->n_body; b++) pal_world_body(world, b)->display.n_output = n_output[b];
     return ms;
 }
 

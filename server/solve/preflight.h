@@ -55,7 +55,7 @@ typedef struct pal_preflight {
 /* Errors: REFUSED, BUDGET, MEMORY as pal_world_create. */
 pal_err pal_preflight_run(const pal_scene *scene, pal_preflight *out, pal_diagnostic *diag);
 /* The same prediction for a world at rest that nobody steps meanwhile: time of a step under load, ms; NaN: unknown. Its
- * forces are measured in a few evaluations; the world is then reset. [job] */
+ * forces are measured in a few evaluations; the world stays as it was. [load] */
 double pal_step_cost_ms(const pal_scene *scene, pal_world *world);
 /* Sentences about one body, one per line, worst first. Returns the number of lines. Without weak spots: the limit
  * and conditioning only. */

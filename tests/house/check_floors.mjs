@@ -43,7 +43,6 @@ const narrow = {
         "server/net/transport",
         "server/net/admission",
         "server/session",
-        "server/solve",
         "server/sim/",
         "server/mesh/",
         "server/num",
