@@ -4,14 +4,18 @@
  * short here, or so long, that every machine agrees. */
 #include "server/net/tuning.h"
 #include "tests/net/command_room.h"
+#include "tests/net/hub_scene.h"
 #include "tests/session/sculpt_body.h"
 
 static clay_scene clay;
 #define TOP "\"x_m\":0.02,\"y_m\":0.02,\"z_m\":0.05"
 
-static void begin(double step_s, bool keep_real_time)
+#define YOUNG_PA 5000
+
+static void begin(double step_s, double young, bool keep_real_time)
 {
     clay.scene.step_s = step_s;
+    clay.scene.body[0].material.young_Pa = young;
     clay.scene.keep_real_time = keep_real_time;
     order_begin(&clay.scene, NULL, 0);
 }
@@ -36,8 +40,8 @@ static double young_Pa(void)
 static void a_command_that_is_slower_than_real_time_is_refused(void)
 {
     mem_client tim, ada;
-    const double soft = clay.scene.body[0].material.young_Pa;
-    begin(1e-4, false); /* 0.1 ms, in which no machine steps 64 cells by hundreds of sub-steps */
+    const double soft = YOUNG_PA;
+    begin(1e-4, YOUNG_PA, false); /* 0.1 ms, in which no machine steps 64 cells by hundreds of sub-steps */
     join(&tim, "Tim", PAL_WIRE_ROLE_TRAINEE, 0);
     join(&ada, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
     run(&tim, &ada, 20, 1);
@@ -60,23 +64,6 @@ static void a_command_that_is_slower_than_real_time_is_refused(void)
     end();
 }
 
-static void so_is_a_configuration(void)
-{
-    mem_client tim, ada;
-    begin(1e-4, false);
-    join(&tim, "Tim", PAL_WIRE_ROLE_TRAINEE, 0);
-    join(&ada, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
-    CHECK(!order(&tim, "configure", "\"size\":3"));
-    CHECK(strstr(trouble(&tim), "configure: a step would take about ") == trouble(&tim));
-    CHECK(strstr(trouble(&tim), "an instructor may order it") != NULL);
-    CHECK_INT(tim.n_text[PAL_CONTROL_TOPOLOGY], 0);
-    CHECK(order(&ada, "configure", "\"size\":3"));
-    until_frame(&ada);
-    CHECK_INT(ada.n_text[PAL_CONTROL_TOPOLOGY], 1);
-    mem_end(&tim), mem_end(&ada);
-    end();
-}
-
 static void set_levels(int n)
 {
     pal_config_entry *model = &clay.scene.body[0].model;
@@ -84,15 +71,32 @@ static void set_levels(int n)
         if (!strcmp(model->value[k].key, "levels")) model->value[k].number[0] = n;
 }
 
-/* A step is compared with its own time, not with that of a longer one: of 100 ms four sub-steps of 4,096 elements are
- * little, but no machine makes one in 0.1 ms */
+static void so_is_a_configuration(void)
+{
+    mem_client tim, ada;
+    begin(1e-4, 1e8, false); /* many sub-steps in 0.1 ms */
+    join(&tim, "Tim", PAL_WIRE_ROLE_TRAINEE, 0);
+    join(&ada, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    CHECK(!order(&tim, "configure", "\"size\":2"));
+    CHECK(strstr(trouble(&tim), "configure: a step would take about ") == trouble(&tim));
+    CHECK(strstr(trouble(&tim), "an instructor may order it") != NULL);
+    CHECK_INT(tim.n_text[PAL_CONTROL_TOPOLOGY], 0);
+    CHECK(order(&ada, "configure", "\"size\":2"));
+    until_frame(&ada), until_frame(&tim);
+    CHECK_INT(ada.n_text[PAL_CONTROL_TOPOLOGY], 1);
+    /* the scene is slow now, as she has left it: what is cheaper than that is allowed */
+    CHECK(order(&tim, "configure", "\"size\":1"));
+    mem_end(&tim), mem_end(&ada);
+    end();
+}
+
+/* A step is compared with its own time, not with that of a longer one: four sub-steps of 4,096 elements fit
+ * into 100 ms, but no machine makes one in 0.1 ms */
 static void so_is_a_step_length(void)
 {
     mem_client tim;
-    const double young_Pa_before = clay.scene.body[0].material.young_Pa;
-    clay.scene.body[0].material.young_Pa = 10;
-    set_levels(3);
-    begin(0.1, false);
+    set_levels(CHECK_REPEATS(3, 2));
+    begin(0.1, 10, false);
     join(&tim, "Tim", PAL_WIRE_ROLE_TRAINEE, 0);
     run(&tim, NULL, 10, 1);
     CHECK(!order(&tim, "configure", "\"step_ms\":0.1"));
@@ -100,37 +104,14 @@ static void so_is_a_step_length(void)
     CHECK_INT(tim.n_text[PAL_CONTROL_TOPOLOGY], 0);
     mem_end(&tim);
     end();
-    clay.scene.body[0].material.young_Pa = young_Pa_before;
-    set_levels(1);
-}
-
-/* Of a scene that does not fit into its time, 0.1 ms, trainees may have what is cheaper than an instructor has left it
- */
-static void a_slow_scene_may_not_become_slower(void)
-{
-    mem_client tim, ada;
-    const double young_Pa_before = clay.scene.body[0].material.young_Pa;
-    clay.scene.body[0].material.young_Pa = 1e8;
-    set_levels(2);
-    begin(1e-4, false);
-    join(&tim, "Tim", PAL_WIRE_ROLE_TRAINEE, 0);
-    join(&ada, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
-    CHECK(!order(&tim, "configure", "\"size\":3")); /* eight times the elements */
-    CHECK(strstr(trouble(&tim), "an instructor may order it") != NULL);
-    CHECK(order(&ada, "configure", "\"size\":3"));
-    until_frame(&ada), until_frame(&tim);
-    CHECK(order(&tim, "configure", "\"size\":2"));
-    mem_end(&tim), mem_end(&ada);
-    end();
-    clay.scene.body[0].material.young_Pa = young_Pa_before;
     set_levels(1);
 }
 
 static void a_material_is_costed_before_the_first_step(void)
 {
     mem_client tim;
-    const double soft = clay.scene.body[0].material.young_Pa;
-    clay.scene.step_s = 1e-4, clay.scene.keep_real_time = false;
+    const double soft = YOUNG_PA;
+    clay.scene.step_s = 1e-4, clay.scene.body[0].material.young_Pa = soft;
     served_begin(&clay.scene, (pal_session_options){.start_paused = true}, (pal_server_options){0});
     join(&tim, "Tim", PAL_WIRE_ROLE_TRAINEE, 0);
     send(&tim, "material", "\"young_Pa\":1e12");
@@ -141,11 +122,52 @@ static void a_material_is_costed_before_the_first_step(void)
     end();
 }
 
+static void component(mem_client *c, const char *enabled)
+{
+    char text[200];
+    snprintf(
+        text, sizeof text,
+        "{\"type\":\"command\",\"verb\":\"component\",\"target\":\"tet_volume\",\"args\":{\"part\":0,\"enabled\":%s}}",
+        enabled);
+    mem_text(c, text);
+}
+
+/* the status after everything that was sent has been done */
+static bool is_disabled(mem_client *c, mem_client *other)
+{
+    run(c, other, 10000, 100);
+    return c->last[PAL_CONTROL_STATUS].status.n_disabled > 0;
+}
+
+/* what was cheap while a component was disabled is not when it comes back */
+static void so_is_a_component(void)
+{
+    static small_scene organ;
+    mem_client tim, ada;
+    REQUIRE(small_scene_make(&organ, "organ"));
+    organ.scene.step_s = 1e-4;
+    organ.scene.body[0].material.young_Pa = 1e10;
+    order_begin(&organ.scene, NULL, 0);
+    join(&tim, "Tim", PAL_WIRE_ROLE_TRAINEE, 0);
+    join(&ada, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    mem_text(&ada, "{\"type\":\"command\",\"verb\":\"allow\",\"target\":\"component\",\"args\":{}}");
+    component(&ada, "0");
+    CHECK(is_disabled(&ada, &tim));
+    component(&tim, "1");
+    CHECK(is_disabled(&ada, &tim));
+    CHECK(strstr(trouble(&tim), "component: a step would take ") == trouble(&tim));
+    component(&ada, "1");
+    CHECK(!is_disabled(&ada, &tim));
+    mem_end(&tim), mem_end(&ada);
+    end();
+    pal_prepared_free(&organ.mesh);
+}
+
 static void an_order_that_slows_the_session_is_taken_back(void)
 {
     mem_client ada, eve;
-    begin(0.01, false);
-    const double soft = clay.scene.body[0].material.young_Pa;
+    begin(0.01, YOUNG_PA, false);
+    const double soft = YOUNG_PA;
     join(&ada, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
     join(&eve, "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     run(&ada, &eve, 200, 1);
@@ -191,8 +213,8 @@ static void run_slowly(mem_client *a, mem_client *b)
 static void orders_after_it_do_not_hide_it(void)
 {
     mem_client ada, tim;
-    begin(0.01, false);
-    const double soft = clay.scene.body[0].material.young_Pa;
+    begin(0.01, YOUNG_PA, false);
+    const double soft = YOUNG_PA;
     join(&ada, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
     join(&tim, "Tim", PAL_WIRE_ROLE_TRAINEE, 0);
     run(&ada, &tim, 200, 1);
@@ -225,7 +247,7 @@ static void edits_and_what_undoes_them_are_taken_back(void)
 {
     mem_client ada, eve;
     char asset[PAL_WIRE_NAME_BYTES];
-    begin(0.01, false);
+    begin(0.01, YOUNG_PA, false);
     join(&ada, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
     join(&eve, "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     run(&ada, &eve, 200, 1);
@@ -257,7 +279,7 @@ static void edits_and_what_undoes_them_are_taken_back(void)
 static void accuracy_is_given_up_before_time_and_comes_back(void)
 {
     mem_client eve;
-    begin(0.05, true); /* of which no machine needs half */
+    begin(0.1, 10, true); /* of which no machine needs half, with sanitizers either */
     join(&eve, "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     run(&eve, NULL, 100, 1);
     run(&eve, NULL, 200, 1); /* in time: nothing happens */
@@ -272,14 +294,72 @@ static void accuracy_is_given_up_before_time_and_comes_back(void)
     CHECK(strstr(trouble(&eve), "1 level") != NULL);
     CHECK(strcmp(part(&eve)->asset, asset) != 0);
     /* in time again, with time to spare: after 20 s as before */
-    run(&eve, NULL, (int)(PAL_QUALITY_SPARE_NS / served_step_ns) - 20, 1);
+    run(&eve, NULL, (int)(PAL_QUALITY_SPARE_NS / served_step_ns) - 40, 1);
     CHECK_INT(eve.n_text[PAL_CONTROL_ERROR], 1);
     for (int i = 0; i < 2000 && eve.n_text[PAL_CONTROL_ERROR] < 2; i++) run(&eve, NULL, 1, 1);
-    CHECK(strstr(trouble(&eve), "there is time to spare: back to ") == trouble(&eve));
+    REQUIRE(strstr(trouble(&eve), "there is time to spare: back to ") == trouble(&eve));
     WAIT_UNTIL(eve.n_text[PAL_CONTROL_TOPOLOGY] == 2, &eve, NULL);
     until_frame(&eve);
     CHECK_TEXT(part(&eve)->asset, asset);
     mem_end(&eve);
+    end();
+}
+
+/* the next cheaper point of the study's Pareto front; each fall makes the next rise later */
+static void a_study_says_what_is_cheaper(void)
+{
+    pal_measured_configuration point[4] = {0};
+    static const double ms[4] = {1, 2, 3, 4};
+    mem_client eve;
+    for (int i = 0; i < 4; i++) {
+        order_point(&point[i], "subdivision_fem", "", i < 3 ? 1 : 2);
+        point[i].ms = ms[i], point[i].error_m = 0.01 / ms[i];
+    }
+    point[0].configuration.step_s = 0.05;
+    point[1].configuration.step_s = 0.1;
+    point[2].configuration.step_s = 0.08, point[2].front = false;
+    clay.scene.step_s = 0.1, clay.scene.body[0].material.young_Pa = 10, clay.scene.keep_real_time = true;
+    order_begin(&clay.scene, point, 4);
+    join(&eve, "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    run(&eve, NULL, 100, 1);
+    for (int k = 0; k < 2; k++) {
+        const int n = eve.n_text[PAL_CONTROL_ERROR], n_topology = eve.n_text[PAL_CONTROL_TOPOLOGY];
+        run_slowly(&eve, NULL);
+        CHECK(strstr(trouble(&eve), "going on with subdivision_fem, 1 level, 100 ms") != NULL);
+        WAIT_UNTIL(eve.n_text[PAL_CONTROL_TOPOLOGY] == n_topology + 1, &eve, NULL);
+        until_frame(&eve);
+        run(&eve, NULL, (int)((PAL_QUALITY_SPARE_NS << k) / served_step_ns) - 40, 1);
+        CHECK_INT(eve.n_text[PAL_CONTROL_ERROR], n + 1);
+        for (int i = 0; i < 500 && eve.n_text[PAL_CONTROL_ERROR] < n + 2; i++) run(&eve, NULL, 1, 1);
+        REQUIRE(strstr(trouble(&eve), "back to subdivision_fem, 2 levels") != NULL);
+        WAIT_UNTIL(eve.n_text[PAL_CONTROL_TOPOLOGY] == n_topology + 2, &eve, NULL);
+        until_frame(&eve);
+    }
+    mem_end(&eve);
+    end();
+}
+
+/* a trainee's jobs may take half of the time; an instructor's are not counted */
+static void a_member_waits_for_the_time_of_its_jobs(void)
+{
+    mem_client tim, ada;
+    begin(0.1, 10, false); /* so soft that 4,096 elements fit into 100 ms */
+    join(&tim, "Tim", PAL_WIRE_ROLE_TRAINEE, 0);
+    join(&ada, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    static const char *const to[] = {"\"size\":3", "\"size\":2"};
+    int n = 0;
+    while (n < 200 && order(&tim, "configure", to[n % 2])) {
+        until_frame(&ada), until_frame(&tim);
+        n++;
+    }
+    CHECK(n >= 1);
+    CHECK_TEXT(tim.last[PAL_CONTROL_ERROR].error.code, "busy");
+    CHECK(strstr(trouble(&tim), "configure: your commands have taken much time: wait ") == trouble(&tim));
+    CHECK(order(&ada, "configure", to[n % 2]));
+    until_frame(&ada), until_frame(&tim);
+    run(&tim, &ada, 1000, 100); /* 100 s */
+    CHECK(order(&tim, "configure", to[(n + 1) % 2]));
+    mem_end(&tim), mem_end(&ada);
     end();
 }
 
@@ -314,7 +394,7 @@ static void commands_of_one_session_do_not_wait_for_anothers(void)
     send(&bo, "extrude", TOP ",\"distance_m\":0.02");
     WAIT_UNTIL(n_answer(&bo) == 1, &ada, &bo);
     CHECK_INT(bo.n_text[PAL_CONTROL_ANSWER], 1);
-    WAIT_UNTIL(n_answer(&ada) == 7, &ada, &bo);
+    WAIT_UNTIL(n_answer(&ada) >= 7, &ada, &bo);
     mem_end(&ada), mem_end(&bo);
     pal_server_close(server);
     for (int i = 0; i < 2; i++) pal_session_close(two[i]);
@@ -324,16 +404,18 @@ int main(void)
 {
     clay_make(&clay, 2, 0.1);
     RUN(a_command_that_is_slower_than_real_time_is_refused);
-    RUN(so_is_a_configuration);
-    RUN(so_is_a_step_length);
-    RUN(a_slow_scene_may_not_become_slower);
+    RUN_SERIAL(so_is_a_configuration);
+    RUN_SERIAL(so_is_a_step_length);
     RUN(a_material_is_costed_before_the_first_step);
+    RUN_SERIAL(so_is_a_component);
     RUN(an_order_that_slows_the_session_is_taken_back);
-    RUN(orders_after_it_do_not_hide_it);
-    RUN(edits_and_what_undoes_them_are_taken_back);
+    RUN_SERIAL(orders_after_it_do_not_hide_it);
+    RUN_SERIAL(edits_and_what_undoes_them_are_taken_back);
     set_levels(2);
     RUN(commands_of_one_session_do_not_wait_for_anothers);
     RUN(accuracy_is_given_up_before_time_and_comes_back);
+    RUN_SERIAL(a_study_says_what_is_cheaper);
+    RUN_LONG(a_member_waits_for_the_time_of_its_jobs);
     clay_free(&clay);
     return check_report();
 }
