@@ -49,7 +49,8 @@ struct pal_session {
     const pal_scene *scene;
     pal_session_options options; /* owns record_path; clock is not NULL */
     pal_world *world;
-    double reach_m, predicted_ms;
+    double reach_m;
+    double predicted_ms; /* of a step under load, when the session was opened; NaN: unknown */
     uint64_t step_ns, lease_ns;
     pal_session_outline outline;
     disabled_components off; /* inherited from earlier sessions */
@@ -74,13 +75,13 @@ struct pal_session {
     /* the simulation thread's own */
     pal_input_log *log;
     bool paused, observed;
-    int single;          /* single steps requested while paused */
-    uint64_t step;       /* taken since open; resets do not count */
-    uint64_t state_step; /* when the record gets the next state */
-    uint64_t n_late;     /* steps that began late */
-    uint64_t work_ns;    /* processor time of the last step */
-    double
-        substep_ns; /* smoothed processor time of a sub-step while no body sleeps, at first as predicted; 0: unknown */
+    int single;                    /* single steps requested while paused */
+    uint64_t step;                 /* taken since open; resets do not count */
+    uint64_t state_step;           /* when the record gets the next state */
+    uint64_t n_late;               /* steps that began late */
+    uint64_t work_ns;              /* processor time of the last step */
+    double substep_ns;             /* smoothed processor time of a sub-step while no body sleeps, at first as
+                                      predicted; 0: unknown */
     uint64_t transferred_ns;       /* after a transfer: when the predecessor was asked to stop */
     uint64_t stopped_ns, pause_ns; /* when the predecessor had stopped, and the longest time that neither ran; for the
                                       thread that opens and transfers */
