@@ -27,6 +27,7 @@
 #define PAL_WIRE_REASON_BYTES  128
 #define PAL_WIRE_LABEL_BYTES   120
 #define PAL_WIRE_METHOD_BYTES  32
+#define PAL_WIRE_MARK_MAX      64  /* marks of a recording */
 #define PAL_WIRE_POINT_MAX     128 /* points of a study that are sent; a point's own index may be larger */
 #define PAL_WIRE_NEIGHBOUR_MAX 8
 #define PAL_WIRE_TOOL_ANY      (-1)
@@ -99,6 +100,11 @@ typedef struct pal_wire_tool_info {
     char name[PAL_WIRE_NAME_BYTES]; /* e.g. "probe" */
     double radius_m;
 } pal_wire_tool_info;
+/* what happened in a recording that the session plays */
+typedef struct pal_wire_mark {
+    double time_s;
+    char text[32];
+} pal_wire_mark;
 typedef struct pal_wire_hello {
     uint32_t version; /* PAL_PROTOCOL_VERSION                                        */
     char session[PAL_WIRE_NAME_BYTES];
@@ -117,7 +123,9 @@ typedef struct pal_wire_hello {
     bool estimates;   /* `estimate` is available; false is not on the wire */
     uint32_t started; /* Unix time at which the server began, s: another one after a reconnection is another run. 0:
                          unknown, and not on the wire */
-    uint16_t you_id;  /* member id, > 0                                              */
+    uint32_t n_mark;  /* 0: not on the wire */
+    pal_wire_mark mark[PAL_WIRE_MARK_MAX];
+    uint16_t you_id; /* member id, > 0                                              */
     pal_wire_role you_role;
     char you_name[PAL_WIRE_MEMBER_NAME];
     int you_tool; /* granted tool, or PAL_WIRE_TOOL_NONE                                */
@@ -152,6 +160,15 @@ typedef struct pal_wire_disabled {
     uint32_t part;
 } pal_wire_disabled;
 
+/* the recording of a session */
+typedef struct pal_wire_playback {
+    bool plays;    /* it plays, or is paused; else the session went on live from time_s */
+    double time_s; /* where */
+    double length_s;
+    double speed; /* wanted: 1 is real time */
+    bool ended;   /* at its end; false is not on the wire */
+} pal_wire_playback;
+
 typedef struct pal_wire_status {
     uint64_t tick; /* steps done                                                     */
     double sim_time_s;
@@ -182,6 +199,8 @@ typedef struct pal_wire_status {
     uint64_t n_unobserved; /* steps without observers     */
     uint32_t n_device;     /* 0: not on the wire          */
     pal_wire_device device[PAL_WIRE_TOOL_MAX];
+    uint32_t n_playback; /* 0: the session has no recording, and not on the wire */
+    pal_wire_playback playback[1];
 } pal_wire_status;
 
 typedef struct pal_wire_member {

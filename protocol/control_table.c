@@ -21,6 +21,8 @@ static const pal_control_field part_fields[] = {{"name", TEXT, true, ONE(part_in
                                                 {0}};
 static const pal_control_field tool_fields[] = {
     {"name", TEXT, true, ONE(tool_info, name)}, {"radius_m", F64, true, ONE(tool_info, radius_m)}, {0}};
+static const pal_control_field mark_fields[] = {
+    {"time_s", F64, true, ONE(mark, time_s)}, {"text", TEXT, true, ONE(mark, text)}, {0}};
 static const pal_control_field you_fields[] = {{"id", U16, true, ONE(hello, you_id)},
                                                {"role", ROLE, true, ONE(hello, you_role)},
                                                {"name", TEXT, true, ONE(hello, you_name)},
@@ -46,6 +48,7 @@ static const pal_control_field HELLO_fields[] = {
     {"component_required", NUMBERS, false, LIST(hello, plan.required, plan.n_required), NULL},
     {"estimates", BOOL, false, ONE(hello, estimates)},
     {"started", U32, false, ONE(hello, started)},
+    {"marks", OBJECTS, false, LIST(hello, mark, n_mark), mark_fields},
     {"you", OBJECT, true, 0, 0, 0, 0, you_fields},
     {0}};
 static const pal_control_field TOPOLOGY_fields[] = {
@@ -72,6 +75,10 @@ static const pal_control_field device_fields[] = {{"tool", U32, true, ONE(device
                                                   {"force_error_N", F64, false, ONE(device, force_error_N)},
                                                   {"opening", F64, false, ONE(device, opening)},
                                                   {0}};
+static const pal_control_field playback_fields[] = {
+    {"plays", BOOL, true, ONE(playback, plays)},      {"time_s", F64, true, ONE(playback, time_s)},
+    {"length_s", F64, true, ONE(playback, length_s)}, {"speed", F64, true, ONE(playback, speed)},
+    {"ended", BOOL, false, ONE(playback, ended)},     {0}};
 static const pal_control_field off_fields[] = {
     {"component", TEXT, true, ONE(disabled, component)}, {"part", U32, true, ONE(disabled, part)}, {0}};
 static const pal_control_field STATUS_fields[] = {
@@ -98,6 +105,7 @@ static const pal_control_field STATUS_fields[] = {
     {"disabled", OBJECTS, false, LIST(status, disabled, n_disabled), off_fields},
     {"unobserved_steps", U64, false, ONE(status, n_unobserved)},
     {"devices", OBJECTS, false, LIST(status, device, n_device), device_fields},
+    {"playback", OBJECTS, false, LIST(status, playback, n_playback), playback_fields},
     {0}};
 static const pal_control_field member_fields[] = {
     {"id", U16, true, ONE(member, id)},         {"role", ROLE, true, ONE(member, role)},

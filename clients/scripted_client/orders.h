@@ -11,7 +11,7 @@
 #include "protocol/control.h"
 #include "server/base/err.h"
 
-enum { PAL_ORDERS_MAX = 256 };
+enum { PAL_ORDERS_MAX = 4096 };
 
 typedef enum pal_side {
     PAL_SIDE_NONE,

@@ -56,6 +56,9 @@ typedef struct serve_run {
     pal_session *session[MAX_SESSIONS];
     pal_resume *resume[MAX_SESSIONS]; /* what a session goes on with; NULL: nothing */
     bool resumes;
+    const char *replay; /* a recording of the only scene, which it plays; NULL: none */
+    pal_session_recording recording;
+    char record[PAL_CONFIG_TEXT + PAL_NAME + 2];
     pal_session_study study[MAX_SESSIONS]; /* borrowed by the server */
     pal_server_gate gate;
     pal_server *server;
@@ -135,18 +138,34 @@ static pal_err open_studies(serve_run *run, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
+/* at its beginning, paused */
+static pal_err open_recording(serve_run *run, pal_session_options *options, pal_diagnostic *diag)
+{
+    pal_recording *recording;
+    PAL_TRY(pal_recording_open(run->replay, run->studied[0].scene, diag, &recording));
+    run->recording = (pal_session_recording){.recording = recording, .record_path = options->record_path};
+    if (pal_recording_cut(recording)[0])
+        pal_log(PAL_LOG_WARN, "replay", "%s is played up to its last whole record", pal_recording_cut(recording));
+    pal_log(PAL_LOG_INFO, "replay", "%s: %.1f s", run->replay, pal_recording_length_s(recording));
+    PAL_TRY(pal_recording_seek(recording, 0, false, diag, &run->resume[0]));
+    options->plays = options->start_paused = true;
+    options->record_path = NULL; /* until it goes on live */
+    return PAL_ERR_OK;
+}
+
 static pal_err open_sessions(serve_run *run, pal_diagnostic *diag)
 {
-    char record[PAL_CONFIG_TEXT + PAL_NAME + 2];
+    char *record = run->record;
     for (int i = 0; i < run->n; i++) {
         const pal_scene *scene = run->studied[i].scene;
         PAL_TRY(pal_preflight_run(scene, &run->preflight[i], diag));
         pal_session_options options = {.wake = pal_server_gate_wake, .user = &run->gate, .only_observed = true};
-        snprintf(record, sizeof record, run->n > 1 ? "%s.%s" : "%s", run->config.record, scene->name);
+        snprintf(record, sizeof run->record, run->n > 1 ? "%s.%s" : "%s", run->config.record, scene->name);
         if (run->config.record[0]) options.record_path = record;
         if (run->resumes) PAL_TRY(pal_resume_open(record, scene, diag, &run->resume[i]));
+        if (run->replay) PAL_TRY(open_recording(run, &options, diag));
         options.resume = run->resume[i];
-        if (run->resume[i])
+        if (run->resume[i] && run->resumes)
             pal_log(PAL_LOG_INFO, "resume", "%s goes on where %s ends, after %.1f s", scene->name,
                     pal_resume_name(run->resume[i]), pal_resume_time_s(run->resume[i]));
         PAL_TRY(pal_session_open(run->resume[i] ? pal_resume_scene(run->resume[i]) : scene, &options, diag,
@@ -178,7 +197,8 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
                                   .error_m = run->config.error_m,
                                   .max_clients = run->config.max_clients,
                                   .resume = run->resume,
-                                  .study = run->study};
+                                  .study = run->study,
+                                  .recording = run->replay ? &run->recording : NULL};
     PAL_TRY(pal_server_open(&options, run->session, run->n, diag, &run->server));
     if (!options.viewer_folder)
         pal_log(PAL_LOG_WARN, "viewer", "no viewer to serve: neither beside the program nor given with --viewer");
@@ -422,6 +442,8 @@ int command_serve(int argc, char **argv)
         {"--seconds", "S", PAL_FLAG_NUMBER, &run.seconds, 0.1, 1e9, "end after so long (a signal ends it)"},
         {"--resume", NULL, PAL_FLAG_SWITCH, &run.resumes, 0, 0,
          "go on where the newest recording of --record ends, after a crash too"},
+        {"--replay", "LOG", PAL_FLAG_TEXT, &run.replay, 0, 0,
+         "play a recording of the scene: pause, seek, speed, and go on live from any moment (recorded with --record)"},
         {"--help-protocol", NULL, PAL_FLAG_SWITCH, &help_protocol, 0, 0,
          "print the commands that clients may give: name, who, numbers, what it does"},
     };
@@ -453,6 +475,11 @@ int command_serve(int argc, char **argv)
     pal_err err = PAL_ERR_OK;
     if (run.resumes && !run.config.record[0])
         err = PAL_REFUSE(&diag, "--resume needs --record FILE, with which it goes on");
+    if (!err && run.replay && (run.resumes || n_input > 1))
+        err = PAL_REFUSE(&diag,
+                         run.resumes ? "--replay and --resume: a recording either plays or goes on"
+                                     : "--replay: a recording is of one scene, and %d are given",
+                         n_input);
     if (!err && unit && run.surface.unit_m == 0) err = PAL_REFUSE(&diag, "--units: \"%.20s\" is not a unit", unit);
     for (int i = 0; !err && i < (n_input ? n_input : 1); i++) err = load_input(&run, n_input ? input[i] : NULL, &diag);
     pal_report_progress(NULL, 0, &run.common);
@@ -464,6 +491,7 @@ int command_serve(int argc, char **argv)
     pal_server_close(run.server);
     for (int i = 0; i < run.n; i++) pal_session_close(run.session[i]);
     for (int i = 0; i < run.n; i++) pal_resume_free(run.resume[i]);
+    pal_recording_close((pal_recording *)(uintptr_t)run.recording.recording);
     for (int i = 0; i < run.n; i++) pal_studied_scene_close(&run.studied[i]);
     for (int i = 0; i < run.n; i++) pal_scene_free(run.scene[i]);
     return err ? pal_report_refusal(&run.common, err, &diag) : 0;

@@ -12,6 +12,7 @@
 #include "server/net/hub_news.h"
 #include "server/net/hub_peers.h"
 #include "server/net/hub_plan.h"
+#include "server/net/hub_steering.h"
 #include "server/net/hub_verb.h"
 #include "server/net/hub_watch.h"
 #include "server/net/transport/plain_text.h"
@@ -75,6 +76,7 @@ static pal_packet *status_message(pal_client *c)
                 w->active[w->n_active++] =
                     (pal_wire_active){(uint32_t)p, (uint32_t)f->part[p].n_active, (uint32_t)f->part[p].n_spring,
                                       (uint32_t)f->part[p].n_finest, (uint32_t)f->part[p].n_finest_spring};
+        pal_hub_playback_status(c->room, w);
         w->n_device = (uint32_t)pal_stream_devices(s, c->room->tool, w->device);
         w->n_late = f->n_late;
         w->n_refused = f->n_refused;
@@ -272,7 +274,10 @@ static void hub_wake(void *user)
         next = pal_hub_report_news(room, now);
         if (next && (!due || next < due)) due = next;
     }
-    for (int r = 0; r < hub->n_room; r++) pal_hub_jobs_update(&hub->room[r]);
+    for (int r = 0; r < hub->n_room; r++) {
+        pal_hub_play_on(&hub->room[r]);
+        pal_hub_jobs_update(&hub->room[r]);
+    }
     if (due) pal_loop_set_due(hub->loop, due);
 }
 
@@ -370,13 +375,10 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
         pal_members_init(&room->members, scene->n_tool);
         if (options->open) room->members.rights = pal_rights_named("") & ~(1u << PAL_RIGHT_COMPONENT);
         if (options->study && options->study[i].n > 0) room->study = options->study[i];
+        if (options->recording) room->recording = options->recording[i];
+        room->passed_step = UINT64_MAX;
         if (options->resume && options->resume[i]) {
-            /* what it borrows is the hub's now */
-            for (int b = 0; b < scene->n_body; b++) {
-                pal_hub_body_edits *edits = &room->edits[b];
-                pal_resume_take_edits(options->resume[i], b, &edits->sculptor, &edits->edit, &edits->change,
-                                      &edits->base);
-            }
+            pal_hub_take_edits(room->edits, options->resume[i]);
             session[i] = NULL;
             room->own = true;
         }
@@ -399,12 +401,7 @@ void pal_hub_destroy(pal_hub *hub)
         if (room->own) pal_session_close(room->session);
         pal_packet_drop(room->members_message);
         for (int k = 0; k < PAL_HUB_OLD_ASSETS; k++) pal_packet_drop(room->past[k].asset);
-        for (int b = 0; b < PAL_BODY_MAX; b++) {
-            pal_sculptor_destroy(room->edits[b].sculptor);
-            pal_sculpt_edit_free(room->edits[b].edit);
-            pal_configuration_switch_free(room->edits[b].change);
-            free(room->edits[b].base);
-        }
+        pal_hub_free_edits(room->edits);
     }
     pal_admission_destroy(hub->admission);
     free(hub->room);

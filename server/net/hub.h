@@ -24,8 +24,9 @@ typedef struct pal_server_options {
     int max_clients;            /* 0: 200 */
     struct pal_resume **resume; /* of sessions that go on after a crash: their edits, taken [n_session]; NULL, or an
                                    entry of it: none */
-    const pal_session_study *study; /* [n_session], borrowed until close; NULL: none */
-    const pal_verb *verb;           /* commands that clients may give [n_verb], borrowed; NULL: pal_verb_table */
+    const pal_session_study *study;         /* [n_session], borrowed until close; NULL: none */
+    const pal_session_recording *recording; /* that they play [n_session], copied; NULL: none */
+    const pal_verb *verb; /* commands that clients may give [n_verb], borrowed; NULL: pal_verb_table */
     int n_verb;
 } pal_server_options;
 

@@ -7,6 +7,7 @@
 #include "server/net/transport/site.h"
 #include "server/net/transport/transport.h"
 #include "server/session/configuration_switch.h"
+#include "server/session/recording.h"
 #include "server/session/sculpt.h"
 
 enum { PAL_HUB_QUEUE = 32, PAL_HUB_OLD_ASSETS = 8, PAL_HUB_CLIENTS = 200 };
@@ -19,6 +20,12 @@ typedef struct pal_session_study {
     int n, body;
     double reference_m; /* error of the study's reference itself; NaN: unknown */
 } pal_session_study;
+
+/* a recording that a session plays until it goes on live */
+typedef struct pal_session_recording {
+    const pal_recording *recording; /* NULL: none */
+    const char *record_path; /* of what goes on live, a name that input_log.h numbers; NULL: it is not recorded */
+} pal_session_recording;
 
 /* one connected peer; in a free entry, peer is NULL */
 typedef struct pal_client {
@@ -143,7 +150,11 @@ typedef struct pal_hub_room {
     bool estimate_requested[PAL_BODY_MAX]; /* the session has been asked for it */
     double step_s;                         /* of the scene as opened: the reference of all costs */
     pal_session_study study;
-    bool reported_far; /* an estimate above the scene's tolerance has been reported */
+    pal_session_recording recording;
+    uint64_t passed_step; /* of the last edit or switch in the recording that the server went past, or tried to;
+                             UINT64_MAX: none since a seek */
+    uint64_t left_step;   /* where the session went on live */
+    bool reported_far;    /* an estimate above the scene's tolerance has been reported */
     int tier_users[PAL_STREAM_TIER_COUNT];
     int n_subscriber[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* clients subscribed to a field */
     bool reported[PAL_BODY_MAX][PAL_FIELD_COUNT];    /* the session has been asked for it */

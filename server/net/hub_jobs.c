@@ -57,12 +57,33 @@ static void make(pal_job *job)
     const pal_scene *scene = NULL;
     const uint64_t before = pal_clock_thread_ns();
     job->err = job->type->prepare(job, &scene);
-    if (!job->err) job->err = pal_session_open_after(job->session, scene, &job->diag, &job->made.session);
+    if (!job->err && job->made.resume)
+        job->err =
+            pal_session_open_at(job->session, job->made.resume, !job->goes_live,
+                                job->goes_live ? job->recording->record_path : NULL, &job->diag, &job->made.session);
+    else if (!job->err)
+        job->err = pal_session_open_after(job->session, scene, &job->diag, &job->made.session);
     if (!job->err) job->err = check_cost(job, scene);
     if (!job->err) job->err = pal_stream_open(job->made.session, job->error_m, &job->diag, &job->made.stream);
     if (!job->err) job->type->transfer(job);
     job->made_ns = pal_clock_now_ns(pal_session_clock(job->session));
     job->work_ns = pal_clock_thread_ns() - before;
+}
+
+void pal_hub_take_edits(pal_hub_body_edits edits[PAL_BODY_MAX], pal_resume *resume)
+{
+    for (int b = 0; b < PAL_BODY_MAX; b++)
+        pal_resume_take_edits(resume, b, &edits[b].sculptor, &edits[b].edit, &edits[b].change, &edits[b].base);
+}
+
+void pal_hub_free_edits(pal_hub_body_edits edits[PAL_BODY_MAX])
+{
+    for (int b = 0; b < PAL_BODY_MAX; b++) {
+        pal_sculptor_destroy(edits[b].sculptor);
+        pal_sculpt_edit_free(edits[b].edit);
+        pal_configuration_switch_free(edits[b].change);
+        free(edits[b].base);
+    }
 }
 
 static void free_products(const pal_job_products *p)
@@ -71,6 +92,9 @@ static void free_products(const pal_job_products *p)
     pal_session_close(p->session);
     pal_sculpt_edit_free(p->edit);
     pal_configuration_switch_free(p->change);
+    pal_resume_free(p->resume);
+    if (p->edits) pal_hub_free_edits(p->edits);
+    free(p->edits);
 }
 
 static void free_job(pal_job *job)
@@ -250,6 +274,13 @@ static void account(pal_hub_room *room, pal_client *c, const pal_job *job)
 {
     room->quality.n_lowered += job->quality;
     if (isinf(job->max_load)) pal_hub_accept_load(room);
+    if (job->type->seeks) {
+        room->n_undo = 0;
+        room->quality = (pal_hub_quality){.n_lowered = 0};
+        room->passed_step = UINT64_MAX;
+        room->left_step = job->step;
+        return;
+    }
     if (!c) return;
     pal_hub_undo *undo = pal_hub_undo_begin(c, job->verb);
     undo->kind = job->type->switches ? PAL_UNDO_SWITCH : PAL_UNDO_EDIT;

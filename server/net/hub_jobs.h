@@ -19,6 +19,8 @@ typedef struct pal_job_products {
     pal_session *session;
     pal_sculpt_edit *edit;
     pal_configuration_switch *change;
+    pal_resume *resume;
+    pal_hub_body_edits *edits; /* of all bodies [PAL_BODY_MAX], on the heap */
 } pal_job_products;
 
 /* a kind of job: how it is parsed, prepared, transferred, committed and answered */
@@ -32,7 +34,8 @@ typedef struct pal_job_type {
     void (*commit)(pal_hub_body_edits *edits, pal_job *job, pal_job_products *retired);
     void (*answer)(pal_client *client, const pal_job *job); /* [net] */
     bool keeps_brushes;                                     /* brushes continue in the next session */
-    bool switches;                                          /* a switch of configuration, else an edit */
+    bool switches;                                          /* a switch of configuration */
+    bool seeks;                                             /* all bodies, in a recording: edits is of body 0 */
 } pal_job_type;
 
 /* One job and its result. The background thread borrows sculptor, session and was; nobody changes or closes them
@@ -56,7 +59,11 @@ struct pal_job {
     pal_configuration configuration, before; /* before: of the running session */
     const pal_body_def *was;                 /* the body before its first switch */
     pal_body_def *base;                      /* a copy of it when this is the first switch, else NULL; owned */
-    double error_now_m, error_then_m;        /* as displayed to clients; NaN: none */
+    /* seek */
+    const pal_session_recording *recording;
+    uint64_t step;
+    bool goes_live;
+    double error_now_m, error_then_m; /* as displayed to clients; NaN: none */
     pal_transfer_report report;
     /* result; on err there is none, and diag gives the reason */
     pal_err err;
@@ -65,6 +72,8 @@ struct pal_job {
     int n_brush_ended;
 };
 
+void pal_hub_take_edits(pal_hub_body_edits edits[PAL_BODY_MAX], pal_resume *resume); /* what it borrows is edits' now */
+void pal_hub_free_edits(pal_hub_body_edits edits[PAL_BODY_MAX]);
 /* appends a command; false: the queue is full, the member's time is used up, or out of memory: an error was sent */
 bool pal_hub_jobs_enqueue(pal_client *client, const pal_job_type *type, const pal_wire_command *command);
 /* the same for the server itself, one at a time and before what waits, in the name of any member, who gets no answer;

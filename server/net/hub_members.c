@@ -3,6 +3,7 @@
 #include "server/base/log.h"
 #include "server/net/hub_peers.h"
 #include "server/net/hub_plan.h"
+#include "server/net/hub_steering.h"
 #include "server/net/transport/host_name.h"
 #include "server/net/transport/plain_text.h"
 #include "server/net/tuning.h"
@@ -107,6 +108,7 @@ static void send_hello(pal_client *c)
     pal_hub_put_plan(c->room, &hello->plan);
     hello->estimates = true;
     hello->started = c->hub->started_s;
+    pal_hub_playback_marks(c->room, hello);
     hello->credit = (uint32_t)c->credit.max;
     hello->you_id = (uint16_t)m->id;
     hello->you_role = (pal_wire_role)m->role;

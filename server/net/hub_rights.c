@@ -50,3 +50,11 @@ bool pal_hub_is_instructor(const pal_client *c)
 {
     return pal_members_find(&c->room->members, c->id)->role == PAL_MEMBER_INSTRUCTOR;
 }
+
+bool pal_hub_playing(const pal_hub_room *room, pal_playing *playing)
+{
+    pal_playing now = {.state = PAL_PLAYS_NOTHING};
+    if (room->recording.recording) pal_session_playing(room->session, &now);
+    if (playing) *playing = now;
+    return now.state != PAL_PLAYS_NOTHING;
+}

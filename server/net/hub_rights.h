@@ -26,6 +26,8 @@ uint32_t pal_rights_named(const char *name);
 bool pal_hub_may(const pal_client *client, pal_right right);
 /* instructors may order what is slower than real time */
 bool pal_hub_is_instructor(const pal_client *client);
+/* does the session play a recording, so that members give it no input? *playing: where; NULL: not wanted */
+bool pal_hub_playing(const pal_hub_room *room, pal_playing *playing);
 /* who may, in words: "instructors, and trainees with the right sculpt" */
 extern const char *const pal_right_text[PAL_RIGHT_COUNT];
 #endif

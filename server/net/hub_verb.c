@@ -57,6 +57,12 @@ bool pal_hub_execute(pal_client *c, const pal_wire_command *command)
     const pal_verb *verb = c->hub->verb, *end = verb + c->hub->n_verb;
     while (verb < end && strcmp(verb->name, command->verb)) verb++;
     if (verb == end) return pal_hub_refuse(c, "verb", "there is no command %s", command->verb);
+    const bool input = verb->right == PAL_RIGHT_TOOL ||
+                       (verb->right > PAL_RIGHT_STEER && verb->right <= PAL_RIGHT_CUT) ||
+                       verb->run == pal_hub_run_reset;
+    if (input && pal_hub_playing(c->room, NULL))
+        return pal_hub_refuse(c, "recording", "%s: the session plays a recording; branch goes on live from here",
+                              verb->name);
     if (!check_right(c, verb) || !check_args(c, verb, command) || !verb->run(c, verb, command)) return false;
     if (verb->right >= PAL_RIGHT_STEER) pal_hub_note_order(c, command);
     return true;

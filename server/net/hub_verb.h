@@ -28,7 +28,8 @@ int pal_verb_describe(const pal_verb *verb, int n_verb, char *text, size_t cap);
 pal_verb_run pal_hub_run_allow, pal_hub_run_hand_over, pal_hub_run_lock, pal_hub_run_mute, pal_hub_run_remove;
 enum { PAL_LOCK_TOOL, PAL_LOCK_SESSION, PAL_REMOVE, PAL_REMOVE_AND_BAN }; /* details of lock and remove */
 pal_verb_run pal_hub_run_steering, pal_hub_run_reset, pal_hub_run_material, pal_hub_run_component, pal_hub_run_estimate,
-    pal_hub_run_switch, pal_hub_run_edit, pal_hub_run_probe, pal_hub_run_brush;
+    pal_hub_run_switch, pal_hub_run_edit, pal_hub_run_probe, pal_hub_run_brush, pal_hub_run_seek, pal_hub_run_speed,
+    pal_hub_run_branch;
 /* detail of a brush is a pal_brush_kind, of an edit a pal_cells_command_kind or one of these */
 enum { PAL_EDIT_PAINT = 100, PAL_EDIT_SET_REST, PAL_EDIT_CUT, PAL_EDIT_UNCUT, PAL_EDIT_UNDO, PAL_EDIT_REDO };
 

@@ -2,6 +2,7 @@
 
 #include "server/net/hub_accuracy.h"
 #include "server/net/hub_jobs.h"
+#include "server/net/hub_rights.h"
 #include "server/net/hub_switch.h"
 #include "server/net/hub_undo.h"
 #include "server/net/tuning.h"
@@ -113,7 +114,7 @@ void pal_hub_watch_pace(pal_hub_room *room)
 {
     const pal_frame *f = room->stream->frame;
     const uint64_t now = pal_loop_now_ns(room->hub->loop);
-    if (!f || f->paused) {
+    if (!f || f->paused || pal_hub_playing(room, NULL)) {
         room->slow_ns = room->quality.slow_ns = room->quality.spare_ns = 0;
         return;
     }

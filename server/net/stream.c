@@ -244,8 +244,9 @@ static void put_tools(pal_stream *s, uint64_t now_ns, const pal_stream_tool tool
         const pal_frame_tool *f = &s->frame->tool[i];
         pal_wire_tool *to = &w.tool[i];
         to->holder = (uint16_t)tool[i].holder;
-        to->colour = tool[i].holder ? tool[i].colour : 0;
-        to->flags = (uint16_t)((tool[i].holder ? PAL_WIRE_TOOL_HELD : 0) | (f->touching ? PAL_WIRE_TOOL_CONTACT : 0) |
+        to->colour = tool[i].holder ? tool[i].colour : s->frame->plays ? PAL_RECORDED_COLOUR : 0;
+        const bool held = s->frame->plays ? f->present : tool[i].holder > 0;
+        to->flags = (uint16_t)((held ? PAL_WIRE_TOOL_HELD : 0) | (f->touching ? PAL_WIRE_TOOL_CONTACT : 0) |
                                (f->holding ? PAL_WIRE_TOOL_GRASPS : 0) | (f->present ? 0 : PAL_WIRE_TOOL_AWAY) |
                                (f->present && now_ns > f->pose_ns + PAL_LEASE_NS ? PAL_WIRE_TOOL_STALE : 0));
         to->radius_m = (float)f->radius_m;
@@ -359,6 +360,9 @@ bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_
     const pal_frame *frame = pal_session_take_frame(stream->session);
     if (!frame) return false;
     stream->frame = frame;
+    /* tools of a recording are nobody's: nobody feels their forces at another place */
+    static const pal_stream_tool nobody[PAL_TOOL_MAX];
+    if (frame->plays) tool = nobody;
     const double dt_s = stream->cycle > 0 && now_ns > stream->cycle_ns ? (double)(now_ns - stream->cycle_ns) * 1e-9 : 0;
     stream->cycle++;
     stream->cycle_ns = now_ns;

@@ -54,6 +54,8 @@
  * the box of a smaller scene (test_hub) */
 #define PAL_POSITION_ERROR_M    5e-5
 #define PAL_POSITIONS_IN_LENGTH 3000
+/* 0xRRGGBB of tools in a recording, whose members it does not name: a grey that no member has (test_playback_hub) */
+#define PAL_RECORDED_COLOUR 0xc0ccd6
 /* simulated s awake after which an estimate does not bound a switch any more (test_switch_bound) */
 #define PAL_HUB_ESTIMATE_OLD_S 1.0
 /* commands that produce another scene: pending of a session and of a member, who clicks faster than they are made

@@ -12,10 +12,9 @@
 /* applies one record to the world, which has taken record->step steps */
 static pal_err apply(pal_replayed *r, const pal_input_record *record, pal_replay_report *report, pal_diagnostic *diag)
 {
-    pal_world *world = r->world;
     if (record->kind == PAL_INPUT_HASH || record->kind == PAL_INPUT_END) {
         report->n_hash++;
-        report->last_hash = pal_world_hash(world);
+        report->last_hash = pal_world_hash(r->world);
         if (report->last_hash == record->hash)
             report->n_hash_equal++;
         else if (report->first_difference == UINT64_MAX)
@@ -23,15 +22,10 @@ static pal_err apply(pal_replayed *r, const pal_input_record *record, pal_replay
         return PAL_ERR_OK;
     }
     if (record->kind == PAL_INPUT_STATE) return PAL_ERR_OK;
-    if (record->kind == PAL_INPUT_RESTORE) return pal_replayed_restore(r, record, diag);
-    bool pose = record->kind == PAL_INPUT_POSE;
+    const bool pose = record->kind == PAL_INPUT_POSE, restore = record->kind == PAL_INPUT_RESTORE;
     report->n_pose += pose;
-    report->n_command += !pose && record->kind != PAL_INPUT_RELEASE;
-    if (record->kind > PAL_INPUT_COMPONENT) {
-        return pal_replayed_change(r, record, diag);
-    }
-    pal_err err = pal_input_apply(world, r->scene, record, diag);
-    if (!err && record->kind == PAL_INPUT_COMPONENT) pal_replayed_component(r, record);
+    report->n_command += !pose && !restore && record->kind != PAL_INPUT_RELEASE;
+    pal_err err = pal_replayed_apply(r, record, diag);
     if (err && pose)
         return PAL_REFUSE(diag, "step %llu: the world refuses a pose that the log says it took",
                           (unsigned long long)record->step);
@@ -73,7 +67,7 @@ pal_err pal_replay_parse(const char *name, const uint8_t *bytes, size_t n_byte, 
     memcpy(report.cut, log.cut, sizeof report.cut);
     if (scene) {
         pal_replayed *replayed = calloc(1, sizeof *replayed); /* too large for the stack */
-        pal_err err = replayed ? pal_replayed_begin(replayed, scene, diag) : PAL_ERR_MEMORY;
+        pal_err err = replayed ? pal_replayed_begin(replayed, scene, false, diag) : PAL_ERR_MEMORY;
         if (!err) err = run(name, bytes, n_byte, replayed, watch, &report, diag);
         if (!err && watch && watch->end) watch->end(watch->user, replayed->world);
         if (replayed) pal_replayed_end(replayed);

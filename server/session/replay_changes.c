@@ -7,11 +7,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-pal_err pal_replayed_begin(pal_replayed *r, const pal_scene *scene, pal_diagnostic *diag)
+pal_err pal_replayed_begin(pal_replayed *r, const pal_scene *scene, bool changes_alone, pal_diagnostic *diag)
 {
     memset(r, 0, sizeof *r);
     r->scene = scene;
-    return pal_world_create(scene, diag, &r->world);
+    r->changes_alone = changes_alone;
+    return changes_alone ? PAL_ERR_OK : pal_world_create(scene, diag, &r->world);
 }
 
 static void drop_next(pal_replayed *r)
@@ -35,7 +36,8 @@ void pal_replayed_end(pal_replayed *r)
     memset(r, 0, sizeof *r);
 }
 
-void pal_replayed_component(pal_replayed *r, const pal_input_record *record)
+/* notes the state of a component, for worlds that replace this one */
+static void note_component(pal_replayed *r, const pal_input_record *record)
 {
     const char *body = r->scene->body[record->index].name;
     int k = 0;
@@ -61,15 +63,29 @@ static pal_scene *scene_of(const pal_replayed *r, const pal_input_record *record
     return scene;
 }
 
-/* the next world takes the place of the present one */
-static void take_place(pal_replayed *r, pal_world *next, const pal_scene *scene, pal_session_transfer_fn *transfer,
-                       void *user)
+static void disable_components(const pal_replayed *r, pal_world *world, const pal_scene *scene)
 {
     for (int k = 0; k < r->n_disabled; k++) {
         const int b = pal_scene_find_body(scene, r->disabled[k].body);
-        if (b >= 0) (void)pal_world_switch_component(next, scene, b, r->disabled[k].component, false, NULL);
+        if (b >= 0) (void)pal_world_switch_component(world, scene, b, r->disabled[k].component, false, NULL);
     }
-    transfer(user, next, r->world);
+}
+
+pal_err pal_replayed_need_world(pal_replayed *r, pal_diagnostic *diag)
+{
+    if (!r->world) PAL_TRY(pal_world_create(r->scene, diag, &r->world));
+    if (r->changes_alone) disable_components(r, r->world, r->scene);
+    return PAL_ERR_OK;
+}
+
+/* the world of the next scene takes the place of the present one; NULL: it is made when it is needed */
+static void take_place(pal_replayed *r, pal_world *next, const pal_scene *scene, pal_session_transfer_fn *transfer,
+                       void *user)
+{
+    if (next) {
+        disable_components(r, next, scene);
+        transfer(user, next, r->world);
+    }
     pal_world_destroy(r->world);
     r->world = next, r->scene = scene;
 }
@@ -98,7 +114,7 @@ static pal_err sculpt(pal_replayed *r, const pal_input_record *record, pal_diagn
     if (!err && n_point) memcpy(point, command.point_m, n_point);
     command.point_m = n_point ? point : NULL;
     if (!err) err = pal_sculptor_prepare(r->body[b].sculptor, scene, &command, diag, &edit);
-    if (!err) err = pal_world_create(pal_sculpt_edit_scene(edit), diag, &next);
+    if (!err && !r->changes_alone) err = pal_world_create(pal_sculpt_edit_scene(edit), diag, &next);
     free(scene);
     free(point);
     if (err) return pal_sculpt_edit_free(edit), err;
@@ -121,7 +137,7 @@ static pal_err prepare(pal_replayed *r, const pal_input_record *record, pal_diag
     pal_err err = scene && base ? PAL_ERR_OK : PAL_ERR_MEMORY;
     if (!err && r->next_base) *r->next_base = r->scene->body[b];
     if (!err) err = pal_configuration_switch_prepare(scene, base, b, &record->configuration, diag, &r->next);
-    if (!err) err = pal_world_create(&r->next->set->scene, diag, &r->next_world);
+    if (!err && !r->changes_alone) err = pal_world_create(&r->next->set->scene, diag, &r->next_world);
     free(scene);
     r->next_body = b;
     if (err) drop_next(r);
@@ -140,6 +156,7 @@ static void finish_switch(pal_replayed *r)
 
 pal_err pal_replayed_restore(pal_replayed *r, const pal_input_record *record, pal_diagnostic *diag)
 {
+    PAL_TRY(pal_replayed_need_world(r, diag));
     pal_body *body = pal_world_body(r->world, record->index);
     const size_t n = 3 * sizeof(double) * (size_t)record->n_point;
     if (record->n_point != body->n_dof)
@@ -158,7 +175,7 @@ pal_err pal_replayed_restore(pal_replayed *r, const pal_input_record *record, pa
                   : PAL_REFUSE(diag, "step %llu: a state that is not finite", (unsigned long long)record->step);
 }
 
-pal_err pal_replayed_change(pal_replayed *r, const pal_input_record *record, pal_diagnostic *diag)
+static pal_err change(pal_replayed *r, const pal_input_record *record, pal_diagnostic *diag)
 {
     if (record->kind == PAL_INPUT_SCULPT) return sculpt(r, record, diag);
     if (record->kind == PAL_INPUT_PREPARE) return prepare(r, record, diag);
@@ -166,7 +183,18 @@ pal_err pal_replayed_change(pal_replayed *r, const pal_input_record *record, pal
         return PAL_REFUSE(diag, "step %llu: a switch that was not prepared", (unsigned long long)record->step);
     if (record->kind == PAL_INPUT_SWITCH)
         finish_switch(r);
-    else if (pal_configuration_switch_snapshot(r->next, r->world))
+    else if (!r->changes_alone && pal_configuration_switch_snapshot(r->next, r->world))
         pal_configuration_switch_rehearse(r->next, r->next_world);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_replayed_apply(pal_replayed *r, const pal_input_record *record, pal_diagnostic *diag)
+{
+    if (record->kind == PAL_INPUT_RESTORE || record->kind == PAL_INPUT_STATE)
+        return pal_replayed_restore(r, record, diag);
+    if (record->kind > PAL_INPUT_COMPONENT) return change(r, record, diag);
+    PAL_TRY(pal_replayed_need_world(r, diag));
+    PAL_TRY(pal_input_apply(r->world, r->scene, record, diag));
+    if (record->kind == PAL_INPUT_COMPONENT) note_component(r, record);
     return PAL_ERR_OK;
 }

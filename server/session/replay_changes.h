@@ -10,7 +10,8 @@ enum { PAL_REPLAY_DISABLED = 64 };
 
 typedef struct pal_replayed {
     const pal_scene *scene; /* of the world */
-    pal_world *world;
+    pal_world *world;       /* NULL: nothing has needed it since the last change (changes_alone) */
+    bool changes_alone;     /* states are not carried over: a RESTORE or STATE sets them */
     struct {
         pal_sculptor *sculptor;
         pal_sculpt_edit *edit;            /* made the scene; NULL: none */
@@ -28,13 +29,13 @@ typedef struct pal_replayed {
     } disabled[PAL_REPLAY_DISABLED];
 } pal_replayed;
 
-/* the world of a scene, which is borrowed; errors of pal_world_create */
-pal_err pal_replayed_begin(pal_replayed *replayed, const pal_scene *scene, pal_diagnostic *diag);
+/* the world of a scene, which is borrowed; with changes_alone it is made later. Errors of pal_world_create */
+pal_err pal_replayed_begin(pal_replayed *replayed, const pal_scene *scene, bool changes_alone, pal_diagnostic *diag);
+/* from now on a world is there, and changes carry its state over. Errors of pal_world_create */
+pal_err pal_replayed_need_world(pal_replayed *replayed, pal_diagnostic *diag);
 void pal_replayed_end(pal_replayed *replayed);
-/* SCULPT, PREPARE, REHEARSE, SWITCH. REFUSED: what the record says cannot be */
-pal_err pal_replayed_change(pal_replayed *replayed, const pal_input_record *record, pal_diagnostic *diag);
 /* RESTORE, STATE: a body takes positions and velocities; REFUSED: it has another number of points */
 pal_err pal_replayed_restore(pal_replayed *replayed, const pal_input_record *record, pal_diagnostic *diag);
-/* notes the state of a component that a COMPONENT record has set, for worlds that replace this one */
-void pal_replayed_component(pal_replayed *replayed, const pal_input_record *record);
+/* any record but HASH and END, as the session took it */
+pal_err pal_replayed_apply(pal_replayed *replayed, const pal_input_record *record, pal_diagnostic *diag);
 #endif

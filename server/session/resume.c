@@ -1,5 +1,6 @@
-/* Two replays of the changes alone, at rest: the first takes the last state of the record and steps the input after it;
- * the second takes the state that the first ends with, as a replay of the record that begins there will. */
+/* The world takes the last state before the moment and steps the input after it. A session with a record of its own
+ * gets a second world, at rest but for the changes, which takes the positions and velocities of the first, as a replay
+ * of that record will. */
 #include "server/session/resume.h"
 
 #include "server/mesh/files/file_bytes.h"
@@ -13,9 +14,13 @@
 
 struct pal_resume {
     const pal_scene *scene; /* as it was served first */
-    char name[PATH_MAX];
-    uint8_t *bytes;
+    const char *name;
+    const uint8_t *bytes;
     size_t n_byte; /* up to the last good record */
+    char own_name[PATH_MAX];
+    uint8_t *own_bytes; /* NULL: borrowed */
+    size_t at;          /* behind the last record that has taken effect */
+    uint64_t step;
     double time_s;
     pal_replayed now; /* its world is the session's */
 };
@@ -26,14 +31,9 @@ static bool is_change(pal_input_kind kind)
            kind == PAL_INPUT_MATERIAL || kind == PAL_INPUT_COMPONENT;
 }
 
-static pal_err apply(pal_replayed *r, const pal_input_record *record, pal_diagnostic *diag)
+static pal_err get(const pal_resume *resume, size_t *at, pal_input_record *out, pal_diagnostic *diag)
 {
-    if (record->kind == PAL_INPUT_RESTORE || record->kind == PAL_INPUT_STATE)
-        return pal_replayed_restore(r, record, diag);
-    if (record->kind > PAL_INPUT_COMPONENT) return pal_replayed_change(r, record, diag);
-    pal_err err = pal_input_apply(r->world, r->scene, record, diag);
-    if (!err && record->kind == PAL_INPUT_COMPONENT) pal_replayed_component(r, record);
-    return err;
+    return pal_input_get_record(resume->name, resume->bytes, resume->n_byte, at, out, diag);
 }
 
 /* the changes in the first n bytes */
@@ -41,20 +41,20 @@ static pal_err change_all(const pal_resume *resume, size_t n, pal_replayed *r, p
 {
     pal_input_record record;
     for (size_t at = PAL_INPUT_HEADER; at < n;) {
-        PAL_TRY(pal_input_get_record(resume->name, resume->bytes, resume->n_byte, &at, &record, diag));
-        if (is_change(record.kind)) PAL_TRY(apply(r, &record, diag));
+        PAL_TRY(get(resume, &at, &record, diag));
+        if (is_change(record.kind)) PAL_TRY(pal_replayed_apply(r, &record, diag));
     }
     return PAL_ERR_OK;
 }
 
-/* where the last states of all bodies begin; 0: there are none */
-static size_t find_state(const pal_resume *resume)
+/* where the last states of all bodies begin, until after `last` steps; 0: there are none */
+static size_t find_state(const pal_resume *resume, uint64_t last)
 {
     pal_input_record record;
     size_t found = 0, begin = 0;
     int n = 0;
     for (size_t at = PAL_INPUT_HEADER, before = at; at < resume->n_byte; before = at) {
-        if (pal_input_get_record(resume->name, resume->bytes, resume->n_byte, &at, &record, NULL)) break;
+        if (get(resume, &at, &record, NULL) || record.step > last) break;
         const bool state = record.kind == PAL_INPUT_STATE || record.kind == PAL_INPUT_RESTORE;
         if (state && record.index == 0) begin = before, n = 0;
         if (state && record.index == n && ++n == resume->scene->n_body) found = begin;
@@ -62,45 +62,63 @@ static size_t find_state(const pal_resume *resume)
     return found;
 }
 
-/* the world at the end of the record: stepped from the last state on, or from rest. A frozen body stays frozen */
-static pal_err step_on(pal_resume *resume, pal_replayed *r, pal_diagnostic *diag)
+static pal_err step_until(pal_resume *resume, pal_replayed *r, uint64_t step, pal_diagnostic *diag)
 {
-    pal_input_record record;
-    size_t at = find_state(resume);
-    uint64_t step = 0;
-    bool first = at > 0;
-    if (at > 0) PAL_TRY(change_all(resume, at, r, diag));
-    if (at == 0) at = PAL_INPUT_HEADER;
-    while (at < resume->n_byte) {
-        PAL_TRY(pal_input_get_record(resume->name, resume->bytes, resume->n_byte, &at, &record, diag));
-        if (first) step = record.step, first = false;
-        for (; step < record.step; step++) {
-            pal_err err = pal_world_step(r->world, r->scene->step_s);
-            pal_world_remove_idle(r->world);
-            resume->time_s = pal_world_time_s(r->world);
-            if (err && err != PAL_ERR_FROZEN)
-                return pal_diagnostic_set(diag, err, "%s: %s", resume->name, pal_err_text(err));
-        }
-        if (record.kind != PAL_INPUT_HASH && record.kind != PAL_INPUT_END) PAL_TRY(apply(r, &record, diag));
+    for (; resume->step < step; resume->step++) {
+        pal_err err = pal_world_step(r->world, r->scene->step_s);
+        pal_world_remove_idle(r->world);
+        if (err && err != PAL_ERR_FROZEN) /* a frozen body stays frozen */
+            return pal_diagnostic_set(diag, err, "%s: %s", resume->name, pal_err_text(err));
     }
     return PAL_ERR_OK;
 }
 
-static pal_err open_at_end(pal_resume *resume, pal_diagnostic *diag)
+/* the world after `last` steps, or at the end of the record: stepped from the last state on, or from rest */
+static pal_err step_on(pal_resume *resume, pal_replayed *r, uint64_t last, pal_diagnostic *diag)
 {
-    pal_replayed *end = calloc(1, sizeof *end);
-    pal_err err = end ? pal_replayed_begin(end, resume->scene, diag) : PAL_ERR_MEMORY;
-    if (!err) err = step_on(resume, end, diag);
-    if (!err) err = pal_replayed_begin(&resume->now, resume->scene, diag);
-    if (!err) err = change_all(resume, resume->n_byte, &resume->now, diag);
-    for (int b = 0; !err && b < resume->scene->n_body; b++) {
+    pal_input_record record;
+    resume->at = find_state(resume, last);
+    bool first = resume->at > 0;
+    if (resume->at > 0) PAL_TRY(change_all(resume, resume->at, r, diag));
+    if (resume->at == 0) resume->at = PAL_INPUT_HEADER;
+    PAL_TRY(pal_replayed_need_world(r, diag));
+    r->changes_alone = false;
+    for (size_t at = resume->at; at < resume->n_byte; resume->at = at) {
+        PAL_TRY(get(resume, &at, &record, diag));
+        if (record.step > last) break;
+        if (first) resume->step = record.step, first = false;
+        PAL_TRY(step_until(resume, r, record.step, diag));
+        if (record.kind != PAL_INPUT_HASH && record.kind != PAL_INPUT_END)
+            PAL_TRY(pal_replayed_apply(r, &record, diag));
+    }
+    if (last != UINT64_MAX) PAL_TRY(step_until(resume, r, last, diag));
+    resume->time_s = pal_world_time_s(r->world);
+    return PAL_ERR_OK;
+}
+
+/* the world as a replay of the changes and of a state makes it */
+static pal_err restore_from(pal_resume *resume, const pal_replayed *end, pal_diagnostic *diag)
+{
+    PAL_TRY(pal_replayed_begin(&resume->now, resume->scene, false, diag));
+    PAL_TRY(change_all(resume, resume->at, &resume->now, diag));
+    for (int b = 0; b < resume->scene->n_body; b++) {
         const pal_body *body = pal_world_body(end->world, b);
-        err = pal_replayed_restore(
+        PAL_TRY(pal_replayed_restore(
             &resume->now,
             &(pal_input_record){
                 .kind = PAL_INPUT_RESTORE, .index = b, .n_point = body->n_dof, .x = body->x, .v = body->v},
-            diag);
+            diag));
     }
+    return PAL_ERR_OK;
+}
+
+static pal_err open_at(pal_resume *resume, uint64_t last, bool records, pal_diagnostic *diag)
+{
+    pal_replayed *end = records ? calloc(1, sizeof *end) : &resume->now;
+    pal_err err = end ? pal_replayed_begin(end, resume->scene, true, diag) : PAL_ERR_MEMORY;
+    if (!err) err = step_on(resume, end, last, diag);
+    if (!records) return err;
+    if (!err) err = restore_from(resume, end, diag);
     if (end) pal_replayed_end(end);
     free(end);
     return err;
@@ -113,11 +131,26 @@ pal_err pal_resume_open(const char *path, const pal_scene *scene, pal_diagnostic
     *out = NULL;
     if (!resume) return PAL_ERR_MEMORY;
     resume->scene = scene;
-    if (!pal_input_log_newest(path, resume->name, sizeof resume->name)) return free(resume), PAL_ERR_OK;
-    pal_err err = pal_file_read(resume->name, PAL_REPLAY_BYTES_MAX, &resume->bytes, &resume->n_byte, diag);
+    if (!pal_input_log_newest(path, resume->own_name, sizeof resume->own_name)) return free(resume), PAL_ERR_OK;
+    resume->name = resume->own_name;
+    pal_err err = pal_file_read(resume->name, PAL_REPLAY_BYTES_MAX, &resume->own_bytes, &resume->n_byte, diag);
+    resume->bytes = resume->own_bytes;
     if (!err) err = pal_log_check_run(resume->name, resume->bytes, resume->n_byte, scene, &log, diag);
     if (!err) resume->n_byte = log.n_good;
-    if (!err) err = open_at_end(resume, diag);
+    if (!err) err = open_at(resume, UINT64_MAX, true, diag);
+    if (err) return pal_resume_free(resume), err;
+    *out = resume;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_resume_at(const char *name, const uint8_t *bytes, size_t n_byte, const pal_scene *scene, uint64_t step,
+                      bool records, pal_diagnostic *diag, pal_resume **out)
+{
+    pal_resume *resume = calloc(1, sizeof *resume);
+    *out = NULL;
+    if (!resume) return PAL_ERR_MEMORY;
+    resume->name = name, resume->bytes = bytes, resume->n_byte = n_byte, resume->scene = scene;
+    pal_err err = open_at(resume, step, records, diag);
     if (err) return pal_resume_free(resume), err;
     *out = resume;
     return PAL_ERR_OK;
@@ -127,7 +160,7 @@ void pal_resume_free(pal_resume *resume)
 {
     if (!resume) return;
     pal_replayed_end(&resume->now);
-    free(resume->bytes);
+    free(resume->own_bytes);
     free(resume);
 }
 
@@ -146,12 +179,32 @@ double pal_resume_time_s(const pal_resume *resume)
     return resume->time_s;
 }
 
+void pal_resume_set_time_s(pal_resume *resume, double time_s)
+{
+    pal_world_set_time_s(resume->now.world, resume->time_s = time_s);
+}
+
 void pal_resume_take_edits(pal_resume *resume, int body, pal_sculptor **sculptor, pal_sculpt_edit **edit,
                            pal_configuration_switch **change, pal_body_def **base)
 {
     *sculptor = resume->now.body[body].sculptor, *edit = resume->now.body[body].edit;
     *change = resume->now.body[body].change, *base = resume->now.body[body].base;
     memset(&resume->now.body[body], 0, sizeof resume->now.body[body]);
+}
+
+int pal_resume_disabled(const pal_resume *resume, int k, const char **body, const char **component)
+{
+    if (k < resume->now.n_disabled) {
+        *body = resume->now.disabled[k].body;
+        *component = resume->now.disabled[k].component;
+    }
+    return resume->now.n_disabled;
+}
+
+const uint8_t *pal_resume_rest(const pal_resume *resume, size_t *n_byte, uint64_t *step)
+{
+    *n_byte = resume->n_byte - resume->at, *step = resume->step;
+    return resume->bytes + resume->at;
 }
 
 pal_world *pal_resume_take_world(pal_resume *resume)
@@ -169,8 +222,8 @@ const pal_scene *pal_resume_recorded_scene(const pal_resume *resume)
 void pal_resume_record(const pal_resume *resume, pal_input_log *log)
 {
     pal_input_record record;
-    for (size_t at = PAL_INPUT_HEADER; at < resume->n_byte;) {
-        if (pal_input_get_record(resume->name, resume->bytes, resume->n_byte, &at, &record, NULL)) return;
+    for (size_t at = PAL_INPUT_HEADER; at < resume->at;) {
+        if (get(resume, &at, &record, NULL)) return;
         record.step = 0;
         if (is_change(record.kind)) pal_input_log_put(log, &record);
     }

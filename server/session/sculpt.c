@@ -230,7 +230,8 @@ static pal_err make_room(const pal_sculptor *s, pal_sculpt_edit *edit)
     size_t before = 3 * sizeof(double) * (size_t)s->now.cells.n_vertex;
     size_t after = 3 * sizeof(double) * (size_t)edit->to.cells.n_vertex;
     edit->n_before = s->now.cells.n_vertex;
-    edit->x = malloc(before), edit->v = malloc(before);
+    /* at rest, until a state is transferred */
+    edit->x = copied(s->now.cells.x, before), edit->v = calloc(1, before);
     if (!edit->next_x) edit->next_x = calloc(1, after), edit->next_v = calloc(1, after);
     bool all = edit->x && edit->v && edit->next_x && edit->next_v;
     return all ? PAL_ERR_OK : PAL_ERR_MEMORY;

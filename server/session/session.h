@@ -8,10 +8,11 @@
  * ramps out over PAL_BLEND_S (server/sim/core/blend.h).
  *
  * Threads exchange data through triple buffers (poses, frames), a command queue and the wake callback. A lock guards
- * only the diagnostic of pal_session_last_diagnostic and the materials. Between open and close the session neither
- * allocates nor touches files, except when a subscription to a field or an estimate begins or ends, or a brush begins
- * or has faded: its component, and the field's part of the frames, are then created or freed between two steps. Fields
- * and estimates are not input: the input log does not record them and they change no hash. Brushes are input. */
+ * only the diagnostic of pal_session_last_diagnostic, the materials and the place in a recording that plays. Between
+ * open and close the session neither allocates nor touches files, except when a subscription to a field or an estimate
+ * begins or ends, or a brush begins or has faded: its component, and the field's part of the frames, are then created
+ * or freed between two steps. Fields and estimates are not input: the input log does not record them and they change no
+ * hash. Brushes are input. */
 #ifndef PAL_SESSION_SESSION_H
 #define PAL_SESSION_SESSION_H
 #include "server/base/clock.h"
@@ -35,8 +36,12 @@ typedef enum pal_command_kind {
     PAL_COMMAND_RESET_BODY, /* body: that body alone back to rest and unfrozen (pal_world_reset_body) */
     PAL_COMMAND_COMPONENT,  /* body, component, wanted: disables or enables a component of the plan (world.h); recorded,
                                kept  by a transfer; pal_session_last_diagnostic gives the reason of a refusal */
+    PAL_COMMAND_SPEED,      /* speed, PAL_SPEED_MIN to PAL_SPEED_MAX, of a recording that is played */
     PAL_COMMAND_COUNT
 } pal_command_kind;
+
+#define PAL_SPEED_MIN 0.1
+#define PAL_SPEED_MAX 10.0
 
 typedef struct pal_command {
     pal_command_kind kind;
@@ -47,6 +52,7 @@ typedef struct pal_command {
     int slot;
     pal_brush brush;
     char component[PAL_NAME];
+    double speed;
     bool in_time; /* MATERIAL, COMPONENT: refused when it needs more sub-steps than before, and a step would be longer
                      than its time by what sub-steps take now */
 } pal_command;
@@ -60,7 +66,9 @@ typedef struct pal_session_options {
     void (*wake)(void *user); /* [sim] called after a frame is published; must not block; NULL: none */
     void *user;
     struct pal_resume
-        *resume; /* the session goes on where a recording ends (resume.h), of whose scene it is; NULL: at rest */
+        *resume; /* the session goes on from a moment of a recording (resume.h), of whose scene it is; NULL: at rest */
+    bool plays;  /* it plays the rest of that recording, which lives as long as the session, and takes no input of
+                    members (pal_session_playing) */
     const char *record_path; /* path of the new input log (replay.h, input_log.h); NULL: none */
     const pal_clock *clock;  /* of pacing, leases, arrival times and estimates; NULL: pal_clock_monotonic */
 } pal_session_options;
@@ -107,7 +115,23 @@ void pal_session_rehearse(pal_session *next, pal_session *before, const pal_sess
                           pal_session_snapshot_fn *snapshot, pal_session_rehearse_fn *rehearse, void *user);
 /* of a session that has replaced another: longest pause of its predecessor, s, and the number of rehearsals */
 double pal_session_pause_s(const pal_session *session, int *n_rehearsed);
+/* The same for a session that goes on from a moment of a recording: with plays, it plays the rest, else it is live,
+ * with a record at record_path (NULL: none). It keeps pace, observers and subscriptions of the other alone; the
+ * functions below take no change and no transfer for it. */
+pal_err pal_session_open_at(const pal_session *before, struct pal_resume *resume, bool plays, const char *record_path,
+                            pal_diagnostic *diag, pal_session **out);
 void pal_session_close(pal_session *session); /* stops and joins the thread; NULL is fine. [load] */
+
+/* What plays, where, and how true. At an edit or a switch the session waits: another one has to go on behind it,
+ * because it has another scene */
+typedef struct pal_playing {
+    enum { PAL_PLAYS_NOTHING, PAL_PLAYS, PAL_PLAYS_CHANGE, PAL_PLAYS_END } state; /* CHANGE: it waits before it */
+    uint64_t step;                                                                /* of the recording */
+    double speed;                                                                 /* wanted: simulated over real time */
+    uint64_t n_hash, n_hash_equal; /* hashes of the recording that were passed, and those that were equal: all of them
+                                      from its beginning to the first change or seek, any after */
+} pal_playing;
+void pal_session_playing(pal_session *session, pal_playing *out); /* copies. [any] */
 
 /* errno of the first write of its record that failed, after which it records nothing; 0: none. [any] */
 int pal_session_record_error(const pal_session *session);
@@ -130,8 +154,8 @@ bool pal_session_has_field(const pal_session *session, int body, pal_field field
  * such tool. One thread at a time per tool. [net] */
 pal_err pal_session_request_pose(pal_session *session, int tool, const pal_pose *pose);
 /* Queues a command, taken between two steps. FULL: 64 are pending; REFUSED: unknown kind, body, material, field, tool
- * or brush. pal_session_last_diagnostic reports what only the world can refuse (nothing within reach of a brush).
- * [any] */
+ * or brush, or an input while a recording plays. pal_session_last_diagnostic reports what only the world can refuse
+ * (nothing within reach of a brush). [any] */
 pal_err pal_session_command(pal_session *session, const pal_command *command);
 /* newest unseen frame or NULL; valid until the next call. One reader. [net] */
 const pal_frame *pal_session_take_frame(pal_session *session);

@@ -68,16 +68,23 @@ struct pal_session {
     _Atomic uint64_t beat_ns, n_refused;
     _Atomic int n_observer; /* observers of frames; used with only_observed */
     pthread_mutex_t lock;
+    pal_playing playing; /* guarded by lock */
     pal_diagnostic diag;
     pal_material material[PAL_BODY_MAX]; /* guarded by lock */
     pal_estimator_set estimators;        /* subscribers to estimates */
 
     /* the simulation thread's own */
     pal_input_log *log;
+    /* the rest of a recording that is played, the next record, and the steps taken until now */
+    const uint8_t *play;
+    size_t n_play, play_at;
+    uint64_t play_step;
+    double speed; /* of simulated time while a recording plays */
     bool paused, observed;
     int single;                    /* single steps requested while paused */
     uint64_t step;                 /* taken since open; resets do not count */
     uint64_t state_step;           /* when the record gets the next state */
+    uint64_t state_work_ns;        /* processor time of the steps since the last one */
     uint64_t n_late;               /* steps that began late */
     uint64_t work_ns;              /* processor time of the last step */
     double substep_ns;             /* smoothed processor time of a sub-step while no body sleeps, at first as

@@ -1,6 +1,6 @@
 /* The simulation thread: takes commands and the newest poses, steps the world, publishes a frame, and sleeps until the
  * next absolute time. It waits for no other thread: poses and frames use triple buffers, commands a queue. The only
- * lock guards the last diagnostic and the materials; an ordinary step does not take it.
+ * lock guards the last diagnostic, the materials and the place in a recording; an ordinary step does not take it.
  *
  * Slowdown is real time over simulated time since a mark that is 1 to 1 + 1/16 s old. */
 #include "server/session/session_core.h"
@@ -54,7 +54,7 @@ static double slowdown(const pal_session *s)
     const mark *oldest = &s->marks[s->first];
     uint64_t real = s->end_ns - oldest->ns, n = s->step - oldest->step;
     if (s->end_ns <= oldest->ns || real < SECOND_NS / 10 || n == 0) return 1;
-    return (double)real / ((double)n * (double)s->step_ns);
+    return s->speed * (double)real / ((double)n * (double)s->step_ns);
 }
 
 static void publish(pal_session *s)
@@ -65,6 +65,7 @@ static void publish(pal_session *s)
     frame->end_ns = s->end_ns;
     frame->step_ns = s->work_ns;
     frame->paused = s->paused;
+    frame->plays = s->play != NULL;
     frame->slowdown = s->paused ? 1 : slowdown(s);
     frame->n_late = s->n_late;
     frame->n_refused = atomic_load_explicit(&s->n_refused, memory_order_relaxed);
@@ -218,6 +219,10 @@ static void execute(pal_session *s, const pal_command *command)
     case PAL_COMMAND_STEP:
         if (s->paused) s->single++;
         break;
+    case PAL_COMMAND_SPEED:
+        s->speed = command->speed;
+        s->first = s->n_marks = 0;
+        break;
     case PAL_COMMAND_FIELD:
         subscribe(s, command);
         break;
@@ -228,6 +233,52 @@ static void execute(pal_session *s, const pal_command *command)
         apply(s, command);
         break;
     }
+}
+
+/* Takes the records of a recording that precede its next step; true: one changed the world. A record that the world
+ * refuses ends it */
+static bool play(pal_session *s)
+{
+    pal_playing now = s->playing; /* no other thread writes it */
+    bool changed = false;
+    now.step = s->play_step, now.speed = s->speed;
+    now.state = s->play_at < s->n_play ? PAL_PLAYS : PAL_PLAYS_END;
+    while (now.state == PAL_PLAYS && s->play_at < s->n_play) {
+        pal_input_record record;
+        pal_diagnostic diag = {""};
+        size_t at = s->play_at;
+        pal_err err = pal_input_get_record("the recording", s->play, s->n_play, &at, &record, &diag);
+        if (!err && record.step > s->play_step) break;
+        const bool hash = record.kind == PAL_INPUT_HASH || record.kind == PAL_INPUT_END;
+        if (record.kind == PAL_INPUT_SCULPT || record.kind == PAL_INPUT_SWITCH) {
+            now.state = PAL_PLAYS_CHANGE;
+            break;
+        }
+        if (!err && hash) {
+            now.n_hash++;
+            now.n_hash_equal += pal_world_hash(s->world) == record.hash;
+        } else if (!err && (record.kind <= PAL_INPUT_COMPONENT)) {
+            err = pal_input_apply(s->world, s->scene, &record, &diag);
+            if (record.kind == PAL_INPUT_POSE) s->tool[record.index].arrived_ns = session_now_ns(s);
+            changed = true;
+        }
+        if (!err && record.kind == PAL_INPUT_MATERIAL) {
+            pthread_mutex_lock(&s->lock);
+            s->material[record.index] = record.material;
+            pthread_mutex_unlock(&s->lock);
+        }
+        if (err) put_diagnostic(s, &diag);
+        s->play_at = at;
+        if (err || s->play_at == s->n_play) now.state = PAL_PLAYS_END;
+    }
+    if (now.state == PAL_PLAYS_END) s->play_at = s->n_play;
+    changed |= now.state == PAL_PLAYS_CHANGE; /* reminds who has to go past it */
+    if (!memcmp(&now, &s->playing, sizeof now)) return changed;
+    pthread_mutex_lock(&s->lock);
+    changed |= now.state != s->playing.state;
+    s->playing = now;
+    pthread_mutex_unlock(&s->lock);
+    return changed;
 }
 
 static bool take_commands(pal_session *s)
@@ -266,6 +317,7 @@ static void time_substep(pal_session *s)
 static void record_state(pal_session *s, pal_input_kind kind)
 {
     s->state_step = s->step + (uint64_t)ceil(PAL_STATE_S / s->scene->step_s);
+    s->state_work_ns = 0;
     for (int b = 0; b < pal_world_body_count(s->world); b++) {
         const pal_body *body = pal_world_body(s->world, b);
         pal_input_log_put(
@@ -288,7 +340,8 @@ static void step(pal_session *s)
     if (s->log && s->step % PAL_INPUT_HASH_STEPS == 0)
         pal_input_log_put(
             s->log, &(pal_input_record){.kind = PAL_INPUT_HASH, .step = s->step, .hash = pal_world_hash(s->world)});
-    if (s->log && s->step >= s->state_step) record_state(s, PAL_INPUT_STATE);
+    s->state_work_ns += s->work_ns;
+    if (s->log && (s->step >= s->state_step || s->state_work_ns >= PAL_STATE_WORK_NS)) record_state(s, PAL_INPUT_STATE);
     if (err) report_error(s, err);
 }
 
@@ -310,7 +363,8 @@ static bool pace(pal_session *s, uint64_t *due)
 {
     const pal_clock *clock = s->options.clock;
     uint64_t now = session_now_ns(s);
-    *due = s->options.unpaced && !s->paused ? now : *due + s->step_ns;
+    const uint64_t step_ns = s->play ? (uint64_t)((double)s->step_ns / s->speed) : s->step_ns;
+    *due = s->options.unpaced && !s->paused ? now : *due + step_ns;
     for (; now < *due && !is_stopped(s); now = session_now_ns(s)) clock->sleep_until_ns(clock->user, *due);
     if (!s->paused && now > *due + (uint64_t)(PAL_LATE_PART * (double)s->step_ns)) s->n_late++;
     if (now > *due + s->step_ns) *due = now;
@@ -328,11 +382,12 @@ static void *simulate(void *user)
         bool changed = take_commands(s);
         uint64_t now = session_now_ns(s);
         atomic_store_explicit(&s->beat_ns, now, memory_order_relaxed);
-        changed = take_poses(s, now) || changed;
+        changed = (s->play ? play(s) : take_poses(s, now)) || changed;
         changed = update_observed(s) || changed;
-        bool moves = !s->paused || s->single > 0;
+        bool moves = (!s->paused || s->single > 0) && (!s->play || s->playing.state == PAL_PLAYS);
         if (moves) {
             step(s);
+            s->play_step++;
             if (s->single > 0) s->single--;
             changed = true;
         }
@@ -363,10 +418,24 @@ static pal_err copy_plan(pal_session *s)
     return PAL_ERR_OK;
 }
 
+static void take_resumed(pal_session *s, pal_resume *resume)
+{
+    const char *body, *component;
+    s->world = pal_resume_take_world(resume);
+    for (int k = 0; k < pal_resume_disabled(resume, k, &body, &component) && k < DISABLED_MAX; k++) {
+        snprintf(s->off.at[k].body, PAL_NAME, "%s", body);
+        snprintf(s->off.at[k].component, PAL_NAME, "%s", component);
+        s->off.n = k + 1;
+    }
+    if (!s->options.plays) return;
+    s->play = pal_resume_rest(resume, &s->n_play, &s->play_step);
+    s->playing = (pal_playing){.state = PAL_PLAYS, .step = s->play_step, .speed = 1};
+}
+
 static pal_err prepare(pal_session *s, pal_diagnostic *diag)
 {
     if (s->options.resume)
-        s->world = pal_resume_take_world(s->options.resume);
+        take_resumed(s, s->options.resume);
     else
         PAL_TRY(pal_world_create(s->scene, diag, &s->world));
     if (!s->options.resume) s->predicted_ms = pal_step_cost_ms(s->scene, s->world);
@@ -434,6 +503,7 @@ pal_err pal_session_open(const pal_scene *scene, const pal_session_options *opti
     s->step_ns = (uint64_t)(scene->step_s * SECOND_NS + 0.5);
     s->lease_ns = s->options.lease_s > 0 ? (uint64_t)(s->options.lease_s * SECOND_NS) : PAL_LEASE_NS;
     s->paused = s->options.start_paused;
+    s->speed = 1;
     s->observed = true;
     atomic_init(&s->beat_ns, session_now_ns(s));
     pal_err err = prepare(s, diag);
@@ -457,6 +527,17 @@ pal_err pal_session_open_after(const pal_session *before, const pal_scene *scene
     options.resume = NULL;
     options.record_path = NULL;
     return pal_session_open(scene, &options, diag, out);
+}
+
+pal_err pal_session_open_at(const pal_session *before, pal_resume *resume, bool plays, const char *record_path,
+                            pal_diagnostic *diag, pal_session **out)
+{
+    pal_session_options options = before->options;
+    options.hold = true;
+    options.resume = resume;
+    options.plays = plays;
+    options.record_path = record_path;
+    return pal_session_open(pal_resume_scene(resume), &options, diag, out);
 }
 
 void pal_session_close(pal_session *s)
@@ -511,8 +592,16 @@ static pal_err refuse(pal_session *s)
     return PAL_ERR_REFUSED;
 }
 
+void pal_session_playing(pal_session *s, pal_playing *out)
+{
+    pthread_mutex_lock(&s->lock);
+    *out = s->playing;
+    pthread_mutex_unlock(&s->lock);
+}
+
 pal_err pal_session_request_pose(pal_session *s, int tool, const pal_pose *pose)
 {
+    if (s->play) return PAL_ERR_OK;
     if (tool < 0 || tool >= s->scene->n_tool || (pose && !pal_pose_ok(pose, s->reach_m))) return refuse(s);
     requested_pose *slot = pal_triple_buffer_slot(&s->tool[tool].triple_buffer);
     slot->present = pose != NULL;
@@ -527,7 +616,9 @@ static bool is_valid(const pal_session *s, const pal_command *command)
     bool has_body = command->body >= 0 && command->body < s->scene->n_body;
     pal_material material = command->material; /* the check may clamp it */
     if ((int)command->kind < 0 || command->kind >= PAL_COMMAND_COUNT) return false;
+    if (command->kind == PAL_COMMAND_SPEED) return command->speed >= PAL_SPEED_MIN && command->speed <= PAL_SPEED_MAX;
     if (command->kind > PAL_COMMAND_RESET && !has_body) return false;
+    if (s->play && record_of[command->kind]) return false;
     switch (command->kind) {
     case PAL_COMMAND_MATERIAL:
         return !pal_material_check(&material, NULL);

@@ -58,10 +58,13 @@ static void transfer_disabled(pal_session *to, const pal_session *from)
 static void transfer_state(pal_session *to, pal_session *from)
 {
     to->paused = from->paused, to->single = from->single;
-    to->step = from->step, to->n_late = from->n_late, to->work_ns = from->work_ns;
-    transfer_disabled(to, from);
+    to->n_late = from->n_late, to->work_ns = from->work_ns, to->speed = from->speed;
     memcpy(to->n_subscriber, from->n_subscriber, sizeof to->n_subscriber);
-    memcpy(to->material, from->material, sizeof to->material); /* neither thread runs */
+    if (!to->options.resume) {
+        to->step = from->step;
+        transfer_disabled(to, from);
+        memcpy(to->material, from->material, sizeof to->material); /* neither thread runs */
+    }
     for (int b = 0; b < to->scene->n_body; b++)
         for (int k = 0; k < PAL_FIELD_COUNT; k++)
             if (to->n_subscriber[b][k] > 0) (void)pal_world_field(to->world, b, (pal_field)k, true, NULL);
@@ -127,13 +130,13 @@ void pal_session_transfer_begin(pal_session *next, pal_session *before, const pa
     if (change && change->configuration && !next->prepared) record_change(next, before, PAL_INPUT_PREPARE, change);
     record_change(next, before, change && change->edit ? PAL_INPUT_SCULPT : PAL_INPUT_SWITCH, change);
     transfer_state(next, before);
-    transfer(user, next->world, before->world);
+    if (transfer) transfer(user, next->world, before->world);
 }
 
 pal_err pal_session_transfer_end(pal_session *next, pal_session *before, pal_diagnostic *diag)
 {
     transfer_commands(next, before);
-    transfer_tools(next, before, session_now_ns(next));
+    if (!next->options.resume) transfer_tools(next, before, session_now_ns(next));
     if (next->recorded) next->log = before->log, before->log = NULL;
     pal_err err = pal_session_start(next, diag);
     measure_pause(next, next->stopped_ns);

@@ -8,6 +8,7 @@
 bin=$1 lives=${2:-20} seconds=${3:-12} seed=${4:-1}
 . "$(dirname "$0")/../clients/rig.sh"
 make_block
+changes=0
 awk -v n="$seconds" 'BEGIN {
     n_verb = split("paint at=front radius_m=0.04 young_factor=1.5|undo|extrude at=top distance_m=0.02|undo|" \
                    "configure step_ms=12|divide at=left|undo|configure step_ms=16", verb, "|")
@@ -52,6 +53,7 @@ life() { # NUMBER TIME SIGNAL
     "$bin/palpate" replay "$log" "$scene" --json >"$work/replay" 2>/dev/null
     check "life $1: every hash of its replay is equal" "$(json hashes_equal "$work/replay")" == "$(json hashes "$work/replay")"
     steps=$(json steps "$work/replay")
+    changes=$((changes + $(json changes "$work/replay")))
     lost=$(awk -v a="$seen" -v b="$steps" 'BEGIN { printf "%.3f", (a > b) * (a - b) / 60 }')
     printf 'life %s: %s s, %s steps seen, %s recorded, %s changes of the scene, %s s lost\n' "$1" "$2" "$seen" "$steps" \
         "$(json changes "$work/replay")" "$lost"
@@ -68,4 +70,5 @@ else
     done
     check "every life but the first went on" "$(grep -c 'goes on where' "$work/serve.err")" == $((lives - 1))
 fi
+check "edits and switches in all recordings" $changes ">=" $((lives > 0 ? lives : seconds / 2))
 finish

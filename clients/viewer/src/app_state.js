@@ -48,6 +48,11 @@ export class AppState {
         return own?.role === "instructor" || (own?.rights ?? "").split(" ").includes(right);
     }
 
+    /** does a recording play, so that tools do not act? */
+    get plays() {
+        return this.status?.playback?.[0]?.plays === true;
+    }
+
     countVertices() {
         this.figures.vertices = [...this.bodies.values()].reduce((n, body) => n + body.nVisible(), 0);
     }

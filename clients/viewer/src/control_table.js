@@ -49,6 +49,7 @@ export const SERVER_MESSAGES = Object.freeze(
             "component_required?": "numbers",
             "estimates?": "bool",
             "started?": "u32",
+            "marks?": [{ time_s: "f64", text: "text" }],
             you: { id: "u16", role: "role", name: "text", "tool?": "tool" },
         },
         topology: {
@@ -91,6 +92,7 @@ export const SERVER_MESSAGES = Object.freeze(
             "disabled?": [{ component: "text", part: "u32" }],
             "unobserved_steps?": "u64",
             "devices?": [{ tool: "u32", "force_error_N?": "f64", "opening?": "f64" }],
+            "playback?": [{ plays: "bool", time_s: "f64", length_s: "f64", speed: "f64", "ended?": "bool" }],
         },
         members: { members: [member], "locked_tools?": "numbers", "locked?": "bool" },
         orders: {

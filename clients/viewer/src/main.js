@@ -11,8 +11,10 @@ import { FieldDisplay } from "./field_display.js";
 import { Layout } from "./layout.js";
 import { MembersPanel } from "./members_panel.js";
 import { Messages } from "./messages.js";
+import { OtherTools } from "./other_tools.js";
 import { withOwnTool } from "./own_tool.js";
 import { PlanPanel } from "./plan_panel.js";
+import { PlaybackBar } from "./playback_bar.js";
 import { PoseSender } from "./pose_sender.js";
 import { SculptPanel } from "./sculpt_panel.js";
 import { Stage } from "./stage.js";
@@ -44,6 +46,8 @@ const fields = new FieldDisplay(state, stage, send, layout);
 const marks = new ToolMarks(stage, htmlById("labels"));
 const panel = new PlanPanel(document, sendCommand);
 const members = new MembersPanel(document, sendCommand, () => performance.now());
+const playback = new PlaybackBar(document, sendCommand);
+const others = new OtherTools();
 const accuracy = new AccuracyPanel(document, sendCommand);
 const sculpt = new SculptPanel(document, sendCommand, save);
 const input = new ToolInput(
@@ -60,7 +64,7 @@ input.onClick = (/** @type {number[]} */ position) => sculpt.click(position);
 input.onFirstDrag = () => htmlById("hint").classList.add("gone");
 const showFigures = () => messages.showFigures();
 const controls = new Controls({ state, stage, layout, input, fields, accuracy, sculpt, send, showFigures });
-const panels = { panel, members, accuracy, sculpt, controls };
+const panels = { panel, members, accuracy, sculpt, playback, others, controls };
 const messages = new Messages({ state, stage, layout, bodies, fields, input, marks, send, ...panels });
 worker.onmessage = (/** @type {MessageEvent<import("./link.js").PageMessage>} */ { data }) => messages.take(data);
 
@@ -104,12 +108,14 @@ function draw() {
             nDrawn++;
         }
         for (const body of state.bodies.values()) if (body.colours.blend(now)) stage.dirty = true;
-        if (stage.dirty) {
+        if (stage.dirty || others.moving(now)) {
+            const own = state.plays ? -1 : state.ownTool;
             marks.drawn = state.tools;
             marks.update(
-                withOwnTool(state.tools, state.ownTool, poses.last),
-                (id) => state.members.get(id)?.name ?? "",
-                state.ownTool,
+                withOwnTool(others.draw(now), own, poses.last),
+                (id, tool) =>
+                    state.members.get(id)?.name ?? (state.plays ? (state.hello?.tools[tool]?.name ?? "") : ""),
+                own,
                 MARK_RADIUS * stage.size,
             );
             stage.draw();

@@ -2,6 +2,7 @@
 import { UNSEEN } from "./body_set.js";
 import { buttonById, htmlById } from "./dom.js";
 import { componentsOf, idleText } from "./plan_list.js";
+import { playbackText } from "./playback_bar.js";
 import { sameTools } from "./tool_marks.js";
 
 /**
@@ -13,7 +14,8 @@ import { sameTools } from "./tool_marks.js";
  *   input: import("./tool_input.js").ToolInput, marks: import("./tool_marks.js").ToolMarks,
  *   panel: import("./plan_panel.js").PlanPanel, members: import("./members_panel.js").MembersPanel,
  *   accuracy: import("./accuracy_panel.js").AccuracyPanel,
- *   sculpt: import("./sculpt_panel.js").SculptPanel, controls: import("./controls.js").Controls,
+ *   sculpt: import("./sculpt_panel.js").SculptPanel, playback: import("./playback_bar.js").PlaybackBar,
+ *   others: import("./other_tools.js").OtherTools, controls: import("./controls.js").Controls,
  *   send: (message: import("./control_table.js").ClientMessage) => void
  * }} Page the parts of the page that messages act on
  */
@@ -43,6 +45,7 @@ export class Messages {
                 input.release();
                 input.enabled = false;
                 state.tools = [];
+                this.page.others.take([], performance.now());
                 stage.dirty = true;
                 break;
             case "control":
@@ -61,6 +64,7 @@ export class Messages {
             case "tools":
                 if (!sameTools(marks.drawn, data.tools, UNSEEN * stage.size)) stage.dirty = true;
                 state.tools = data.tools;
+                this.page.others.take(data.tools, performance.now());
                 break;
             case "silence":
                 layout.silence(data.seconds);
@@ -88,6 +92,7 @@ export class Messages {
             case "error":
                 return this.error(message);
             case "answer":
+                this.page.playback.answered();
                 if (!accuracy.answer(message)) sculpt.answer(message);
                 return;
             case "study":
@@ -112,6 +117,7 @@ export class Messages {
         input.radius = message.tools[Math.max(0, state.ownTool)]?.radius_m ?? RADIUS_SHARE * stage.size;
         bodies.truncate(message.parts.length);
         this.page.members.begin();
+        this.page.playback.begin(message.marks ?? []);
         state.plan = message;
         state.status = null;
         this.showComponents();
@@ -151,11 +157,16 @@ export class Messages {
         if (message.frozen) layout.notice(this.stoppedText(message));
         else layout.clearNotice();
         const slow = message.slowdown > REAL_TIME;
-        const text = message.paused
-            ? "paused"
-            : slow
-              ? `${message.slowdown.toFixed(1)}× slower than real time`
-              : "live";
+        const playback = message.playback?.[0];
+        this.page.playback.show(playback, state.may("steer"));
+        this.showHint();
+        const text = playback
+            ? playbackText(playback, message.paused)
+            : message.paused
+              ? "paused"
+              : slow
+                ? `${message.slowdown.toFixed(1)}× slower than real time`
+                : "live";
         layout.connection(message.frozen ? "lost" : "live", text);
         this.showFigures();
     }
@@ -186,6 +197,7 @@ export class Messages {
     error({ code, text }) {
         const { accuracy, fields, layout, sculpt, state } = this.page;
         if (code === "tool_taken") return;
+        this.page.playback.answered();
         if (COMMAND_ERRORS.includes(code) && (sculpt.refused(text) || accuracy.refused(text))) return;
         if (code === "field" && state.field !== "none") fields.choose("none");
         layout.notice(text, NOTICE_MS);
@@ -212,9 +224,9 @@ export class Messages {
     /** the hint disappears for good with the first drag, but a user without a tool learns why nothing moves */
     showHint() {
         const { input, state } = this.page;
-        input.enabled = state.ownTool >= 0;
+        input.enabled = state.ownTool >= 0 && !state.plays;
         const hint = htmlById("hint");
-        if (state.ownTool < 0 && state.members.has(state.ownId)) {
+        if (!input.enabled && state.members.has(state.ownId)) {
             hint.classList.remove("gone");
             hint.textContent = this.watchingText();
         } else if (!hint.classList.contains("gone"))
@@ -224,6 +236,7 @@ export class Messages {
     /** why a member without a tool moves nothing @returns {string} */
     watchingText() {
         const own = this.page.state.members.get(this.page.state.ownId);
+        if (this.page.state.plays) return "This is a recording. Drag to look around.";
         if (own?.role === "viewer") return "You are watching. Drag to look around.";
         if (own?.muted) return "An instructor lets you watch only. Drag to look around.";
         return "All tools are in use. You are watching; you get a tool as soon as one is free.";

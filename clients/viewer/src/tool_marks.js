@@ -63,7 +63,7 @@ export class ToolMarks {
     }
 
     /**
-     * @param {Tool[]} tools @param {(holder: number) => string} nameOf @param {number} mine own tool, -1 none
+     * @param {Tool[]} tools @param {(holder: number, tool: number) => string} nameOf @param {number} mine own tool, -1 none
      * @param {number} radiusLimit smallest drawn radius, m
      */
     update(tools, nameOf, mine, radiusLimit) {
@@ -85,7 +85,7 @@ export class ToolMarks {
                 mark.arrow.setLength(length, 0.25 * length, 0.12 * length);
                 mark.arrow.setColor(tool.colour);
             }
-            mark.label.textContent = i === mine ? "you" : nameOf(tool.holder);
+            mark.label.textContent = i === mine ? "you" : nameOf(tool.holder, i);
             mark.label.style.color = cssColour(tool.colour);
         });
         for (let i = tools.length; i < this.marks.length; i++)

@@ -63,7 +63,7 @@ typedef struct pal_frame {
     int n_substep;
     bool watched; /* positions are of this tick; false: there are no observers, and positions may be older */
     /* filled by the session */
-    bool paused;
+    bool paused, plays; /* plays: a recording, whose tools these are */
     double slowdown;    /* real over simulated time, 1: real time (mean over the last second) */
     uint64_t n_late;    /* steps that started late */
     uint64_t n_refused; /* poses and commands refused                                              */

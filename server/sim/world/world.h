@@ -100,8 +100,9 @@ void pal_world_watch(pal_world *world, bool watched);
 void pal_world_frame(const pal_world *world, pal_frame *out); /* [sim] copies */
 uint64_t pal_world_hash(const pal_world *world); /* [sim] FNV-1a over the bits of tick, x, v and levels of every body */
 
-uint64_t pal_world_tick(const pal_world *world);                                      /* steps since create or reset */
-double pal_world_time_s(const pal_world *world);                                      /* simulated time since then */
+uint64_t pal_world_tick(const pal_world *world);            /* steps since create or reset */
+double pal_world_time_s(const pal_world *world);            /* simulated time since then */
+void pal_world_set_time_s(pal_world *world, double time_s); /* of a world that goes on from a moment of another */
 void pal_world_current_material(const pal_world *world, int body, pal_material *out); /* with live edits; copies */
 int pal_world_component_count(const pal_world *world);
 void pal_world_component_info(const pal_world *world, int index, pal_component_info *out);

@@ -131,6 +131,11 @@ double pal_world_time_s(const pal_world *world)
     return world->time_s;
 }
 
+void pal_world_set_time_s(pal_world *world, double time_s)
+{
+    world->time_s = time_s;
+}
+
 const pal_body *pal_world_view_body(const pal_world *world, int body)
 {
     return &world->plan.body[body];
