@@ -146,9 +146,9 @@ static void ws_state(void *user, pal_link_state state, int code, const char *rea
 }
 
 /* models on LCM; a server that counts from the start again after a pause is another session */
-static void lcm_model(void *user, const char *channel, const void *bytes, size_t n_byte)
+static void lcm_model(void *user, const char *channel, const void *bytes, size_t n_byte, uint64_t source)
 {
-    (void)channel;
+    (void)channel, (void)source;
     pal_bridge_net *n = user;
     pal_wire_haptic haptic;
     if (pal_lcm_to_haptic(bytes, n_byte, &haptic) || haptic.tool != n->o.tool) {
@@ -160,7 +160,7 @@ static void lcm_model(void *user, const char *channel, const void *bytes, size_t
     net_model(n, &haptic);
 }
 
-static void lcm_refused(void *user, const char *channel, pal_walk reason)
+static void lcm_refused(void *user, const char *channel, const char *reason)
 {
     (void)channel, (void)reason;
     ((pal_bridge_net *)user)->count.n_refused++;
@@ -352,6 +352,7 @@ static pal_err net_open_lcm(pal_bridge_net *n, pal_diagnostic *diag)
     static const pal_lcm_events events = {lcm_model, lcm_refused};
     char channel[PAL_LCM_CHANNEL_MAX + 1];
     PAL_TRY(pal_lcm_link_open(n->loop, n->o.server, &events, n, diag, &n->lcm));
+    if (n->o.lcm_key) PAL_TRY(pal_lcm_link_use_keys(n->lcm, n->o.lcm_key, diag));
     pal_lcm_channel(channel, n->o.session, "HMODEL", n->o.tool);
     return pal_lcm_link_subscribe(n->lcm, channel, palpate_haptic_model_t_get_type_info());
 }

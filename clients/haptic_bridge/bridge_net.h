@@ -10,6 +10,7 @@ typedef struct pal_bridge_net pal_bridge_net;
 
 typedef struct pal_bridge_net_options {
     const char *server;   /* ws://host:port/ws or lcm://group:port?ttl=0; borrowed */
+    const char *lcm_key;  /* LCM: key file, NULL: none; borrowed */
     const char *session;  /* LCM: session name in the channels; borrowed */
     const char *name;     /* of the member; borrowed                                 */
     int tool;             /* index; with a websocket also PAL_WIRE_TOOL_ANY */

@@ -329,6 +329,8 @@ int main(int argc, char **argv)
          "for the other hand, with the next tool"},
         {"--server", "URL", PAL_FLAG_TEXT, &net->server, 0, 0, "ws://host:port/ws or lcm://group:port?ttl=0"},
         {"--session", "NAME", PAL_FLAG_TEXT, &net->session, 0, 0, "LCM: name in the channels (main)"},
+        {"--lcm-key", "FILE", PAL_FLAG_TEXT, &net->lcm_key, 0, 0,
+         "LCM: key file, to sign poses and to take signed models alone"},
         {"--name", "NAME", PAL_FLAG_TEXT, &net->name, 0, 0, "name among the members"},
         {"--tool", "N", PAL_FLAG_TEXT, &b.tool, 0, 0, "tool to take: index or any; LCM: index (any, 0)"},
         {"--hand", "NAME", PAL_FLAG_TEXT, &b.hand, 0, 0, "virtual: average | light | firm | off"},

@@ -1,7 +1,13 @@
 #include "clients/lcm_bridge/lcm_bridge.h"
+#include "clients/lcm_bridge/lcm_orders.h"
+#include "clients/link/asset_store.h"
 #include "clients/link/lcm_convert.h"
+#include "clients/link/lcm_seal.h"
+#include "clients/link/triangle_table.h"
 #include "palpate_body_frame_t.h"
+#include "palpate_order_t.h"
 #include "palpate_session_status_t.h"
+#include "palpate_triangles_t.h"
 #include "protocol/frame_codec.h"
 #include "server/base/clock.h"
 #include "server/base/log.h"
@@ -14,7 +20,9 @@
 #define POSE_BURST   10.0
 #define SILENCE_NS   5000000000u
 #define REPEAT_NS    1000000000u
-#define RESTARTED_NS 1000000000u /* after this pause a sender may count from the start again */
+#define RESTARTED_NS 1000000000u  /* after this pause a sender without seal may count from the start again */
+#define TRIANGLES_NS 100000000u   /* between two tables of triangles of a part */
+#define OTHER_NS     60000000000u /* between two warnings of another bridge */
 
 typedef struct bridge_tool {
     pal_lcm_bridge *bridge;
@@ -22,7 +30,7 @@ typedef struct bridge_tool {
     int index;
     double tokens;
     uint32_t seq;
-    uint64_t last_ns;
+    uint64_t last_ns, source; /* of the last state */
 } bridge_tool;
 
 typedef struct bridge_part {
@@ -30,6 +38,10 @@ typedef struct bridge_part {
     size_t n_byte, cap;
     pal_frame_head head;
     uint64_t sent_ns;
+    /* of a part that adapts */
+    pal_triangle_table table; /* n_slot 0: it does not */
+    const pal_stored_asset *asset;
+    uint64_t table_sent_ns, table_sent; /* when its triangles were sent, and which change */
 } bridge_part;
 
 struct pal_lcm_bridge {
@@ -39,10 +51,13 @@ struct pal_lcm_bridge {
     char server[256], session[PAL_WIRE_NAME_BYTES], organ[PAL_WIRE_TEXT_BYTES];
     bool named;
     pal_wire_topology topology;
+    pal_wire_status status; /* the last one */
+    pal_asset_store *store;
+    pal_lcm_orders orders;
     bridge_part part[PAL_WIRE_PART_MAX];
     bridge_tool tool[PAL_WIRE_TOOL_MAX];
     uint32_t status_seq, n_tool;
-    uint64_t status_ns;
+    uint64_t status_ns, told_ns, other_ns; /* when a refusal, and another bridge, were last logged */
     pal_lcm_bridge_counts count;
 };
 
@@ -62,6 +77,65 @@ static void bridge_body(pal_lcm_bridge *b, uint32_t index)
         b->count.n_frame_dropped++;
     else
         b->count.n_frame++;
+}
+
+/* the present triangles of a part that adapts, once its asset is there */
+static void bridge_triangles(pal_lcm_bridge *b, uint32_t index)
+{
+    bridge_part *part = &b->part[index];
+    const pal_triangle_table *table = &part->table;
+    const uint32_t n = pal_triangle_table_count(table);
+    if (!table->n_slot || !n) return;
+    int32_t *corner = malloc(sizeof *corner * 3 * n);
+    if (!corner) return;
+    palpate_triangles_t t = {.utime = (int64_t)(pal_clock_ns() / 1000),
+                             .change = (int64_t)table->revision,
+                             .epoch = (int32_t)b->topology.part[index].epoch,
+                             .version = PAL_LCM_VERSION,
+                             .part = (int16_t)index,
+                             .corner = corner};
+    for (uint32_t i = 0; i < table->n_slot; i++) {
+        const uint32_t *tri = table->tri + 3 * (size_t)i;
+        if (tri[0] == tri[1]) continue; /* an empty slot */
+        for (int k = 0; k < 3; k++) corner[t.n_corner++] = (int32_t)tri[k];
+    }
+    part->table_sent = table->revision, part->table_sent_ns = pal_clock_ns();
+    if (!pal_lcm_link_publish(b->lcm, b->session, "TRIANGLES", (int)index, palpate_triangles_t_get_type_info(), &t))
+        b->count.n_triangles++;
+    free(corner);
+}
+
+/* the tables begin with the triangles of the assets, which are fetched */
+static void begin_triangles(pal_lcm_bridge *b)
+{
+    for (uint32_t i = 0; i < b->topology.n_part; i++) {
+        const pal_wire_part_info *info = &b->topology.part[i];
+        bridge_part *part = &b->part[i];
+        pal_triangle_table_free(&part->table);
+        part->asset = NULL, part->table_sent = 0;
+        if (!info->is_adaptive || pal_triangle_table_init(&part->table, info->n_triangle, info->n_vertex)) continue;
+        part->asset = pal_asset_store_request(b->store, info->asset);
+        if (part->asset && part->asset->ready) (void)pal_triangle_table_set_base(&part->table, part->asset->asset);
+    }
+}
+
+static void asset_changed(void *user, const pal_stored_asset *asset)
+{
+    pal_lcm_bridge *b = user;
+    if (asset->failed) pal_log(PAL_LOG_WARN, "asset", "%s: %s", asset->path, asset->reason);
+    for (uint32_t i = 0; i < b->topology.n_part; i++)
+        if (asset->ready && b->part[i].asset == asset && b->part[i].table.n_slot &&
+            !pal_triangle_table_set_base(&b->part[i].table, asset->asset))
+            bridge_triangles(b, i);
+}
+
+static void take_triangles(pal_lcm_bridge *b, const uint8_t *bytes, size_t n_byte)
+{
+    pal_topology_delta_head head;
+    if (pal_topology_delta_get_head(bytes, n_byte, &head) || head.part >= b->topology.n_part) return;
+    bridge_part *part = &b->part[head.part];
+    if (!part->table.n_slot || pal_triangle_table_apply(&part->table, bytes, n_byte, &head)) return;
+    if (pal_clock_ns() - part->table_sent_ns > TRIANGLES_NS) bridge_triangles(b, head.part);
 }
 
 /* server's status, or NULL when there is no server */
@@ -130,6 +204,7 @@ static void watcher_message(void *user, const pal_wire_head *head, const uint8_t
 {
     pal_lcm_bridge *b = user;
     if (head->kind == PAL_WIRE_FRAME) bridge_frame(b, bytes, n_byte);
+    if (head->kind == PAL_WIRE_TOPOLOGY_DELTA) take_triangles(b, bytes, n_byte);
     if (head->kind == PAL_WIRE_TOOLS) pal_link_acknowledge(b->watcher, bytes, n_byte);
 }
 
@@ -143,10 +218,16 @@ static void watcher_control(void *user, const pal_control *c)
         b->topology.n_part = c->hello.n_part;
         memcpy(b->topology.part, c->hello.part, sizeof b->topology.part);
         for (int i = 0; i < PAL_WIRE_PART_MAX; i++) b->part[i].n_byte = 0;
+        begin_triangles(b);
         pal_log(PAL_LOG_INFO, "lcm_joined", "session %s: %s", b->session, b->organ);
     }
-    if (c->type == PAL_CONTROL_TOPOLOGY) b->topology = c->topology;
-    if (c->type == PAL_CONTROL_STATUS) bridge_status(b, &c->status);
+    if (c->type == PAL_CONTROL_STATUS) b->status = c->status;
+    if (c->type == PAL_CONTROL_TOPOLOGY) {
+        b->topology = c->topology;
+        begin_triangles(b);
+    }
+    /* a topology too: listeners learn the assets before the first frame of theirs */
+    if (c->type == PAL_CONTROL_STATUS || c->type == PAL_CONTROL_TOPOLOGY) bridge_status(b, &b->status);
 }
 
 static void watcher_state(void *user, pal_link_state state, int code, const char *reason)
@@ -207,8 +288,16 @@ static void tool_open(pal_lcm_bridge *b, bridge_tool *tool)
     b->count.n_tool += tool->link != NULL;
 }
 
+/* Does a state follow the last one? Its number grows, by no more than so many states as come in the time since. A
+ * sender that begins anew is another source, or unsealed and was silent */
+static bool follows(const bridge_tool *tool, uint64_t source, uint32_t seq, uint64_t silence_ns)
+{
+    if (!tool->link || source != tool->source || (!source && silence_ns >= RESTARTED_NS)) return true;
+    return pal_seal_follows(seq, tool->seq, silence_ns);
+}
+
 /* a tool_state_t (lcmtypes/) that passed the walk */
-static void bridge_state(pal_lcm_bridge *b, int index, const void *bytes, size_t n_byte)
+static void bridge_state(pal_lcm_bridge *b, int index, const void *bytes, size_t n_byte, uint64_t source)
 {
     bridge_tool *tool = &b->tool[index];
     pal_wire_pose pose;
@@ -218,14 +307,14 @@ static void bridge_state(pal_lcm_bridge *b, int index, const void *bytes, size_t
         return;
     }
     const uint64_t silence = now - tool->last_ns;
-    /* reordered or repeated datagrams; a sender that was silent may have started again */
-    if (tool->link && silence < RESTARTED_NS && (int32_t)(pose.seq - tool->seq) <= 0) {
+    if (!follows(tool, source, pose.seq, silence)) {
         b->count.n_state_refused++;
         return;
     }
     b->count.n_state++;
     tool->last_ns = now;
     tool->seq = pose.seq;
+    tool->source = source;
     tool->tokens = tool->tokens + POSE_RATE_HZ * 1e-9 * (double)silence;
     if (tool->tokens > POSE_BURST) tool->tokens = POSE_BURST;
     if (!tool->link) tool_open(b, tool);
@@ -234,22 +323,42 @@ static void bridge_state(pal_lcm_bridge *b, int index, const void *bytes, size_t
     pal_link_send_pose(tool->link, &pose);
 }
 
-static void bridge_lcm_message(void *user, const char *channel, const void *bytes, size_t n_byte)
+/* two rigs that call their sessions the same on one bus move each other's tools */
+static void hear_other(pal_lcm_bridge *b, uint64_t source)
+{
+    const uint64_t now = pal_clock_ns();
+    if (source == pal_lcm_link_source(b->lcm) || (b->other_ns && now - b->other_ns < OTHER_NS)) return;
+    b->other_ns = now;
+    b->count.n_other++;
+    pal_log(PAL_LOG_WARN, "lcm_session",
+            "another palpate-lcm takes the session %s to this bus: give one of them another name with --session",
+            b->session);
+}
+
+static void bridge_lcm_message(void *user, const char *channel, const void *bytes, size_t n_byte, uint64_t source)
 {
     pal_lcm_bridge *b = user;
     const int index = pal_lcm_channel_index(channel, b->session, "TOOL");
+    char own[PAL_LCM_CHANNEL_MAX + 1];
+    pal_lcm_channel(own, b->session, "ORDER", -1);
+    if (!strcmp(channel, own)) pal_lcm_orders_take(&b->orders, bytes, n_byte, source);
+    pal_lcm_channel(own, b->session, "STATUS", -1);
+    if (!strcmp(channel, own)) hear_other(b, source);
     if (index < 0) return;
     if (index < PAL_WIRE_TOOL_MAX && (uint32_t)index < b->n_tool)
-        bridge_state(b, index, bytes, n_byte);
+        bridge_state(b, index, bytes, n_byte, source);
     else
         b->count.n_state_refused++;
 }
 
-static void bridge_lcm_refused(void *user, const char *channel, pal_walk reason)
+static void bridge_lcm_refused(void *user, const char *channel, const char *reason)
 {
     pal_lcm_bridge *b = user;
+    const uint64_t now = pal_clock_ns();
     b->count.n_state_refused++;
-    pal_log(PAL_LOG_DEBUG, "lcm_refused", "%.63s: %s", channel, pal_walk_text(reason));
+    const bool told = b->told_ns && now - b->told_ns < REPEAT_NS;
+    pal_log(told ? PAL_LOG_DEBUG : PAL_LOG_WARN, "lcm_refused", "%.63s: %s", channel, reason);
+    if (!told) b->told_ns = now;
 }
 
 /* four times a second: releases tools without states, requests tools that were refused, and repeats parts at rest and
@@ -269,6 +378,10 @@ static void bridge_tidy(void *user)
             pal_link_send_control(tool->link, &(pal_control){.type = PAL_CONTROL_TAKE_TOOL, .tool = i});
         }
     }
+    for (uint32_t i = 0; i < b->topology.n_part; i++)
+        if (b->part[i].table.n_slot &&
+            (b->part[i].table.revision != b->part[i].table_sent || now - b->part[i].table_sent_ns > REPEAT_NS))
+            bridge_triangles(b, i);
     for (uint32_t i = 0; i < b->topology.n_part; i++)
         if (b->part[i].n_byte > 0 && now - b->part[i].sent_ns > REPEAT_NS) bridge_body(b, i);
     if (pal_link_current_state(b->watcher) != PAL_LINK_JOINED && now - b->status_ns > REPEAT_NS && b->session[0])
@@ -291,15 +404,23 @@ pal_err pal_lcm_bridge_open(pal_link_loop *loop, const pal_lcm_bridge_options *o
                                    .name = "palpate-lcm",
                                    .role = PAL_WIRE_ROLE_VIEWER,
                                    .tool = PAL_WIRE_TOOL_NONE,
+                                   .topology_deltas = true,
                                    .events = &watcher_events,
                                    .user = b};
     pal_err err = pal_lcm_link_open(loop, options->lcm, &lcm_events, b, diag, &b->lcm);
+    if (!err && options->key_file) err = pal_lcm_link_use_keys(b->lcm, options->key_file, diag);
     if (!err) err = pal_lcm_link_subscribe(b->lcm, PAL_LCM_PREFIX "/.*/TOOL/.*", palpate_tool_state_t_get_type_info());
+    if (!err) err = pal_lcm_link_subscribe(b->lcm, PAL_LCM_PREFIX "/.*/ORDER", palpate_order_t_get_type_info());
+    if (!err)
+        err = pal_lcm_link_subscribe(b->lcm, PAL_LCM_PREFIX "/.*/STATUS", palpate_session_status_t_get_type_info());
+    if (!err && !(b->store = pal_asset_store_create(loop, b->server, asset_changed, b))) err = PAL_ERR_MEMORY;
+    b->orders = (pal_lcm_orders){.loop = loop, .lcm = b->lcm, .server = b->server, .session = b->session};
     if (!err) err = pal_link_open(loop, &link, diag, &b->watcher);
     if (!err && !pal_link_add_timer(loop, 250000, bridge_tidy, b)) err = PAL_ERR_MEMORY;
     if (err) {
         pal_link_close(b->watcher);
         pal_lcm_link_close(b->lcm);
+        pal_asset_store_destroy(b->store);
         free(b);
         return err;
     }
@@ -311,11 +432,17 @@ void pal_lcm_bridge_close(pal_lcm_bridge *bridge)
 {
     if (!bridge) return;
     pal_lcm_link_close(bridge->lcm);
-    for (int i = 0; i < PAL_WIRE_PART_MAX; i++) free(bridge->part[i].bytes);
+    for (int i = 0; i < PAL_WIRE_PART_MAX; i++) {
+        free(bridge->part[i].bytes);
+        pal_triangle_table_free(&bridge->part[i].table);
+    }
+    pal_asset_store_destroy(bridge->store);
     free(bridge);
 }
 
 pal_lcm_bridge_counts pal_lcm_bridge_count(const pal_lcm_bridge *bridge)
 {
-    return bridge->count;
+    pal_lcm_bridge_counts count = bridge->count;
+    count.n_order = bridge->orders.n_order, count.n_order_refused = bridge->orders.n_refused;
+    return count;
 }

@@ -8,12 +8,12 @@
  *     listener sees a part at rest. Longer than a datagram: in fragments, of which none may be lost, so a listener's
  *     receive buffer must hold the frame.
  *   - STATUS, session_status_t: with every status message of the server, 1 Hz without a server.
+ *   - TRIANGLES/<part>, triangles_t: the present triangles of a part that adapts.
  *   - HMODEL/<n>, haptic_model_t.
- * In: TOOL/<n>, tool_state_t: length walk, then version, range and finite numbers, increasing seq.
- * Thread: [net].
- *
- * A part that adapts is shown on LCM with the triangles of its asset: TOPOLOGY_DELTA needs every one before it,
- * datagrams may be lost and listeners come late. */
+ *   - ANSWER, answer_t, about orders (lcm_orders.h).
+ * In: TOOL/<n>, tool_state_t: length walk, admission (lcm_seal.h), then version, range and finite numbers, a seq that
+ * grows by no more than the time allows.
+ * Thread: [net]. */
 #ifndef PAL_LCM_BRIDGE_LCM_BRIDGE_H
 #define PAL_LCM_BRIDGE_LCM_BRIDGE_H
 #include "clients/link/lcm_link.h"
@@ -21,13 +21,15 @@
 typedef struct pal_lcm_bridge pal_lcm_bridge;
 
 typedef struct pal_lcm_bridge_options {
-    const char *server;  /* ws://host:port/ws; borrowed                      */
-    const char *lcm;     /* URL of the bus; borrowed                         */
-    const char *session; /* name in channels; NULL: the server's; borrowed   */
+    const char *server;   /* ws://host:port/ws; borrowed                      */
+    const char *lcm;      /* URL of the bus; borrowed                         */
+    const char *session;  /* name in channels; NULL: the server's; borrowed   */
+    const char *key_file; /* of the bus (lcm_seal.h), NULL: none; borrowed    */
 } pal_lcm_bridge_options;
 
 typedef struct pal_lcm_bridge_counts {
-    uint64_t n_frame, n_frame_dropped, n_state, n_state_refused, n_model, n_status;
+    uint64_t n_frame, n_frame_dropped, n_state, n_state_refused, n_model, n_status, n_triangles, n_order,
+        n_order_refused, n_other;
     int n_tool;   /* with a member now                          */
     bool refused; /* the server refused for good: the loop was stopped */
 } pal_lcm_bridge_counts;

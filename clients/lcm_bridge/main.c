@@ -9,13 +9,16 @@
 
 int main(int argc, char **argv)
 {
-    const char *server = "ws://127.0.0.1:8090/ws", *lcm = "udpm://239.255.76.67:7667?ttl=0", *session = NULL;
+    const char *server = "ws://127.0.0.1:8090/ws", *lcm = "udpm://239.255.76.67:7667?ttl=0", *session = NULL,
+               *key_file = NULL;
     pal_flag_common common;
     double seconds = 0;
     const pal_flag flag[] = {
         {"--server", "URL", PAL_FLAG_TEXT, &server, 0, 0, "palpate server (ws://127.0.0.1:8090/ws)"},
         {"--lcm", "URL", PAL_FLAG_TEXT, &lcm, 0, 0, "LCM bus (udpm://239.255.76.67:7667?ttl=0)"},
         {"--session", "NAME", PAL_FLAG_TEXT, &session, 0, 0, "name in the channels (the server's)"},
+        {"--lcm-key", "FILE", PAL_FLAG_TEXT, &key_file, 0, 0,
+         "key file: sign what goes to the bus, and take only what was signed with a key in it"},
         {"--seconds", "S", PAL_FLAG_NUMBER, &seconds, 0.1, 1e6, "end after this time (never)"},
     };
     const pal_flag_table table = {
@@ -32,7 +35,8 @@ int main(int argc, char **argv)
     pal_link_loop *loop = NULL;
     pal_lcm_bridge *bridge = NULL;
     pal_err err = pal_link_loop_create(&loop);
-    if (!err) err = pal_lcm_bridge_open(loop, &(pal_lcm_bridge_options){server, lcm, session}, &diag, &bridge);
+    if (!err)
+        err = pal_lcm_bridge_open(loop, &(pal_lcm_bridge_options){server, lcm, session, key_file}, &diag, &bridge);
     if (!err) err = pal_link_stop_on_signals(loop);
     if (err)
         fprintf(stderr, "palpate-lcm: %s\n", diag.text[0] ? diag.text : pal_err_text(err));
@@ -42,7 +46,8 @@ int main(int argc, char **argv)
         const pal_lcm_bridge_counts c = pal_lcm_bridge_count(bridge);
         cJSON *report = PAL_JSON({"frames", JSON_NUMBER(c.n_frame)}, {"frames_dropped", JSON_NUMBER(c.n_frame_dropped)},
                                  {"states", JSON_NUMBER(c.n_state)}, {"states_refused", JSON_NUMBER(c.n_state_refused)},
-                                 {"models", JSON_NUMBER(c.n_model)}, {"statuses", JSON_NUMBER(c.n_status)});
+                                 {"models", JSON_NUMBER(c.n_model)}, {"triangles", JSON_NUMBER(c.n_triangles)},
+                                 {"orders", JSON_NUMBER(c.n_order)}, {"statuses", JSON_NUMBER(c.n_status)});
         (void)pal_json_write(stdout, report);
     }
     const bool refused = !err && pal_lcm_bridge_count(bridge).refused;

@@ -1,4 +1,6 @@
 #include "clients/link/lcm_link.h"
+#include "clients/link/lcm_seal.h"
+#include "server/base/clock.h"
 #include "server/base/log.h"
 
 #include <arpa/inet.h>
@@ -9,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <time.h>
 #include <unistd.h>
 
 enum { LCM_SUBSCRIPTIONS = 8, LCM_URL_BYTES = 256, LCM_RETRY_S = 5, LCM_BUFFER_WANTED = 4000000, LCM_QUEUE = 100 };
@@ -29,6 +32,11 @@ struct pal_lcm_link {
     lcm_t *lcm;
     int n_subscriber;
     lcm_subscriber subscriber[LCM_SUBSCRIPTIONS];
+    uint64_t source;
+    int64_t sent_us; /* of the last message */
+    bool is_keyed;
+    pal_keys keys;
+    pal_seal_senders senders;
     uint8_t *buffer; /* of publish [n_buffer] */
     int n_buffer;
 };
@@ -65,15 +73,29 @@ static void lcm_check_buffer(void)
     fclose(file);
 }
 
+static int64_t unix_us(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
 static void lcm_received(const lcm_recv_buf_t *buffer, const char *channel, void *user)
 {
     lcm_subscriber *s = user;
-    pal_walk walk = pal_lcm_walk(s->type, buffer->data, buffer->data_size);
-    if (strnlen(channel, PAL_LCM_CHANNEL_MAX + 1) > PAL_LCM_CHANNEL_MAX) walk = PAL_WALK_STRING;
-    if (!walk)
-        s->link->events->message(s->link->user, channel, buffer->data, buffer->data_size);
-    else if (s->link->events->refused)
-        s->link->events->refused(s->link->user, channel, walk);
+    pal_lcm_link *link = s->link;
+    size_t n_byte = buffer->data_size;
+    uint64_t source = 0;
+    const pal_walk walk = pal_lcm_walk(s->type, buffer->data, pal_seal_begin(buffer->data, n_byte));
+    /* its own come back from the bus */
+    if (!walk && !link->memory && pal_seal_source(buffer->data, n_byte) == link->source) return;
+    const char *reason = walk ? pal_walk_text(walk)
+                              : pal_seal_admit(&link->senders, channel, buffer->data, &n_byte,
+                                               link->is_keyed ? &link->keys : NULL, pal_clock_ns(), unix_us(), &source);
+    if (!reason)
+        link->events->message(link->user, channel, buffer->data, n_byte, source);
+    else if (link->events->refused)
+        link->events->refused(link->user, channel, reason);
 }
 
 static pal_err lcm_attach(pal_lcm_link *link, lcm_subscriber *s)
@@ -149,6 +171,7 @@ pal_err pal_lcm_link_open(pal_link_loop *loop, const char *url, const pal_lcm_ev
     pal_err err = lcm_url(link->url, url, &link->memory, diag);
     /* a memory queue belongs to its caller's own loop of calls */
     link->loop = link->memory ? NULL : loop;
+    if (!err) err = pal_random_bytes(&link->source, sizeof link->source);
     if (!err && link->loop && !pal_link_add_timer(loop, LCM_RETRY_S * 1000000ull, lcm_retry, link))
         err = PAL_ERR_MEMORY;
     if (err) {
@@ -159,6 +182,18 @@ pal_err pal_lcm_link_open(pal_link_loop *loop, const char *url, const pal_lcm_ev
     lcm_try(link);
     *out = link;
     return PAL_ERR_OK;
+}
+
+pal_err pal_lcm_link_use_keys(pal_lcm_link *link, const char *key_file, pal_diagnostic *diag)
+{
+    PAL_TRY(pal_key_file_read(key_file, &link->keys, diag));
+    link->is_keyed = true;
+    return PAL_ERR_OK;
+}
+
+uint64_t pal_lcm_link_source(const pal_lcm_link *link)
+{
+    return link->source;
 }
 
 void pal_lcm_link_close(pal_lcm_link *link)
@@ -186,15 +221,21 @@ pal_err pal_lcm_link_publish(pal_lcm_link *link, const char *session, const char
     if (!link->lcm) return PAL_ERR_STATE;
     const int wanted = type->encoded_size(message);
     if (wanted < 0) return PAL_ERR_REFUSED;
-    if (wanted > link->n_buffer) {
-        uint8_t *grown = realloc(link->buffer, (size_t)wanted);
+    if (wanted + PAL_SEAL_BYTES > link->n_buffer) {
+        uint8_t *grown = realloc(link->buffer, (size_t)wanted + PAL_SEAL_BYTES);
         if (!grown) return PAL_ERR_MEMORY;
-        link->buffer = grown, link->n_buffer = wanted;
+        link->buffer = grown, link->n_buffer = wanted + PAL_SEAL_BYTES;
     }
     const int n_byte = type->encode(link->buffer, 0, wanted, message);
     if (n_byte < 0) return PAL_ERR_REFUSED;
     pal_lcm_channel(channel, session, what, n);
-    return lcm_publish(link->lcm, channel, link->buffer, (unsigned)n_byte) == 0 ? PAL_ERR_OK : PAL_ERR_IO;
+    const int64_t now_us = unix_us();
+    link->sent_us = now_us > link->sent_us ? now_us : link->sent_us + 1;
+    if (!pal_seal_put(link->buffer + n_byte, link->source, link->sent_us, channel, link->buffer, (size_t)n_byte,
+                      link->is_keyed ? &link->keys.key[link->keys.n - 1] : NULL))
+        return PAL_ERR_INTERNAL;
+    return lcm_publish(link->lcm, channel, link->buffer, (unsigned)n_byte + PAL_SEAL_BYTES) == 0 ? PAL_ERR_OK
+                                                                                                 : PAL_ERR_IO;
 }
 
 void pal_lcm_link_handle(pal_lcm_link *link)

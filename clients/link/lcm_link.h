@@ -1,5 +1,5 @@
-/* LCM on the clients' event loop. Opening checks the multicast route; every message passes a length check before
- * decoding.
+/* LCM on the clients' event loop. Opening checks the multicast route; every message is sealed when it is sent, and
+ * passes admission (lcm_seal.h) and a length check before decoding.
  *
  * LCM is a bus for one trusted LAN: a forged fragment can crash any subscriber. Only palpate-lcm and palpate-bridge
  * use it. Without a multicast route, one warning names the command that adds it, the bus is retried every 5 s, and
@@ -19,17 +19,22 @@
 typedef struct pal_lcm_link pal_lcm_link;
 
 typedef struct pal_lcm_events {
-    /* a message of a subscribed channel that passed the length check; borrowed for the call */
-    void (*message)(void *user, const char *channel, const void *bytes, size_t n_byte);
-    /* a message that failed it, or whose channel is not plain text; may be NULL */
-    void (*refused)(void *user, const char *channel, pal_walk reason);
+    /* a message of a subscribed channel that was admitted and passed the length check, without its seal; source: of
+     * lcm_seal.h, 0 unknown; borrowed for the call */
+    void (*message)(void *user, const char *channel, const void *bytes, size_t n_byte, uint64_t source);
+    /* a message that did not, with the reason in words; may be NULL */
+    void (*refused)(void *user, const char *channel, const char *reason);
 } pal_lcm_events;
 
 /* url: "udpm://239.255.76.67:7667?ttl=0", "memq://", or "lcm://..." for udpm. REFUSED: invalid URL. A bus that cannot
  * be opened yet is not an error (see above). Copies url, borrows loop and events. */
 pal_err pal_lcm_link_open(pal_link_loop *loop, const char *url, const pal_lcm_events *events, void *user,
                           pal_diagnostic *diag, pal_lcm_link **out);
-void pal_lcm_link_close(pal_lcm_link *link); /* after the loop is destroyed; NULL is fine */
+/* Signs what is published, and takes only what was signed (lcm_seal.h). REFUSED: the key file. Before the first message
+ */
+pal_err pal_lcm_link_use_keys(pal_lcm_link *link, const char *key_file, pal_diagnostic *diag);
+uint64_t pal_lcm_link_source(const pal_lcm_link *link); /* of what it publishes (lcm_seal.h) */
+void pal_lcm_link_close(pal_lcm_link *link);            /* after the loop is destroyed; NULL is fine */
 
 /* channel: an LCM regular expression, kept when the bus reopens; at most 8. type: expected by the length check. */
 pal_err pal_lcm_link_subscribe(pal_lcm_link *link, const char *channel, const lcm_type_info_t *type);

@@ -35,6 +35,8 @@ const pal_flag pal_config_keys[PAL_CONFIG_KEYS] = {
      "most error of streamed positions, m (1/3000 of the box, at most 0.00005)"},
     {"max_clients", "N", PAL_FLAG_COUNT, NULL, 1, 10000, "clients at once (200)"},
     {"lcm", "URL", PAL_FLAG_TEXT, NULL, 0, 0, "also speak LCM there, in a process of its own (off)"},
+    {"lcm_key", "FILE", PAL_FLAG_TEXT, NULL, 0, 0,
+     "key file of that bus: only what is signed with a key in it moves tools (none)"},
     {"log", levels, PAL_FLAG_WORD, NULL, 0, 0, "what is logged (info)"},
     {"record", "FILE", PAL_FLAG_TEXT, NULL, 0, 0, "write the input log there, for palpate replay (off)"},
 };
@@ -44,7 +46,8 @@ static const size_t place[PAL_CONFIG_KEYS] = {
     offsetof(pal_config, hosts),  offsetof(pal_config, tls_cert), offsetof(pal_config, tls_key),
     offsetof(pal_config, health), offsetof(pal_config, open),     offsetof(pal_config, keys),
     offsetof(pal_config, viewer), offsetof(pal_config, error_m),  offsetof(pal_config, max_clients),
-    offsetof(pal_config, lcm),    offsetof(pal_config, log),      offsetof(pal_config, record),
+    offsetof(pal_config, lcm),    offsetof(pal_config, lcm_key),  offsetof(pal_config, log),
+    offsetof(pal_config, record),
 };
 
 void pal_config_default(pal_config *config)

@@ -296,13 +296,10 @@ static pal_err find_lcm(serve_run *run, pal_diagnostic *diag)
 static void become_lcm(const serve_run *run, const lcm_child *child)
 {
     sigset_t none;
-    char *const argv[] = {(char *)"palpate-lcm",
-                          (char *)"--server",
-                          (char *)child->server,
-                          (char *)"--lcm",
-                          (char *)run->config.lcm,
-                          run->common.quiet ? (char *)"--quiet" : NULL,
-                          NULL};
+    const char *argv[9] = {"palpate-lcm", "--server", child->server, "--lcm", run->config.lcm};
+    int n = 5;
+    if (run->config.lcm_key[0]) argv[n++] = "--lcm-key", argv[n++] = run->config.lcm_key;
+    if (run->common.quiet) argv[n++] = "--quiet";
     prctl(PR_SET_PDEATHSIG, SIGTERM);
     for (int k = 0; k < N_HANDLED; k++) signal(handled_signal[k], SIG_DFL);
     signal(SIGPIPE, SIG_DFL);
@@ -311,7 +308,7 @@ static void become_lcm(const serve_run *run, const lcm_child *child)
     /* stdout belongs to the parent's announcement, sockets to the parent */
     dup2(STDERR_FILENO, STDOUT_FILENO);
     close_range(3, ~0u, 0);
-    execv(run->lcm_program, argv);
+    execv(run->lcm_program, (char *const *)argv);
     _exit(127);
 }
 

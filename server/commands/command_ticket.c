@@ -77,7 +77,7 @@ int command_ticket(int argc, char **argv)
     pal_err err = f.keys      ? PAL_ERR_OK
                   : f.new_key ? PAL_REFUSE(&diag, "--new-key needs --keys FILE, where the key is to stand")
                               : PAL_REFUSE(&diag, "a ticket needs --keys FILE with the key that signs it");
-    if (!err) err = f.new_key ? pal_ticket_keys_add(f.keys, &id, &diag) : make_ticket(&f, text, &diag);
+    if (!err) err = f.new_key ? pal_key_file_add(f.keys, &id, &diag) : make_ticket(&f, text, &diag);
     if (err) return pal_report_refusal(&common, err, &diag);
     if (common.json && f.new_key)
         return pal_report_json(&common, PAL_JSON({"ok", JSON_BOOL(true)}, {"key", JSON_NUMBER(id)}));

@@ -141,7 +141,7 @@ void pal_stream_transfer(pal_stream *stream, const pal_stream *before)
     stream->cycle = before->cycle, stream->cycle_ns = before->cycle_ns;
     stream->step_ms = before->step_ms, stream->step_rate_hz = before->step_rate_hz;
     memcpy(stream->n_step, before->n_step, sizeof stream->n_step);
-    stream->step_sum_s = before->step_sum_s;
+    stream->step_sum_s = before->step_sum_s, stream->counted_tick = before->counted_tick;
     memcpy(stream->component_ms, before->component_ms, sizeof stream->component_ms);
     stream->count = before->count;
     memcpy(stream->haptic_seq, before->haptic_seq, sizeof stream->haptic_seq);
@@ -387,7 +387,9 @@ bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_
         if (stream->component_ms[r] < 1e-6) stream->component_ms[r] = 0;
     }
     stream->step_ms += 0.2 * ((double)frame->step_ns * 1e-6 - stream->step_ms);
-    count_step(stream, 1e-9 * (double)frame->step_ns);
+    /* a frame may show other tools or another state after the same step */
+    if (frame->tick != stream->counted_tick) count_step(stream, 1e-9 * (double)frame->step_ns);
+    stream->counted_tick = frame->tick;
     return true;
 }
 

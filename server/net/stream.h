@@ -59,6 +59,7 @@ typedef struct pal_stream {
      * the sum, s */
     uint64_t n_step[PAL_STEP_BOUNDS + 1];
     double step_sum_s;
+    uint64_t counted_tick; /* of the last of them */
     pal_stream_count count;
     /* encoders and their buffer */
     pal_frame_encoder *encoder[PAL_BODY_MAX][PAL_STREAM_TIER_COUNT];

@@ -1,11 +1,14 @@
 /* LCM types, the length walk, conversions and the memory bus. */
 #include "clients/link/lcm_convert.h"
 #include "clients/link/lcm_link.h"
+#include "palpate_answer_t.h"
 #include "palpate_body_frame_t.h"
 #include "palpate_haptic_config_t.h"
 #include "palpate_haptic_event_t.h"
 #include "palpate_haptic_status_t.h"
+#include "palpate_order_t.h"
 #include "palpate_session_status_t.h"
+#include "palpate_triangles_t.h"
 #include "tests/check.h"
 
 static char text16[] = "sixteen letters!", text3[] = "abc", text0[] = "";
@@ -83,7 +86,8 @@ static void encoded_sizes_are_those_of_the_design(void)
 }
 
 /* every message of the package, encoded */
-static int all_messages(uint8_t bytes[8][4096], size_t n[8], const lcm_type_info_t *type[8])
+enum { N_TYPE = 10 };
+static int all_messages(uint8_t bytes[N_TYPE][4096], size_t n[N_TYPE], const lcm_type_info_t *type[N_TYPE])
 {
     palpate_contact_patch_t patch[8];
     static uint8_t payload[100];
@@ -97,20 +101,29 @@ static int all_messages(uint8_t bytes[8][4096], size_t n[8], const lcm_type_info
     const palpate_body_frame_t frame = {.size = 100, .payload = payload};
     const palpate_session_status_t session = {
         .session = text3, .organ = text16, .server = text0, .n_part = 2, .epoch = epoch, .asset = asset, .diag = text0};
-    const void *message[7] = {&state, &model, &event, &status, &config, &frame, &session};
+    double value[2] = {0.5, -2};
+    int32_t corner[6] = {0, 1, 2, 2, 1, 3};
+    const palpate_order_t order = {.verb = text3, .target = text0, .n_arg = 2, .key = asset, .value = value};
+    const palpate_answer_t answer = {
+        .verb = text3, .code = text0, .text = text16, .n_arg = 2, .key = asset, .value = value};
+    const palpate_triangles_t triangles = {.n_corner = 6, .corner = corner};
+    const void *message[N_TYPE] = {&state, &model,   &event, &status, &config,
+                                   &frame, &session, &order, &answer, &triangles};
+    type[7] = palpate_order_t_get_type_info(), type[8] = palpate_answer_t_get_type_info();
+    type[9] = palpate_triangles_t_get_type_info();
     type[0] = palpate_tool_state_t_get_type_info(), type[1] = palpate_haptic_model_t_get_type_info();
     type[2] = palpate_haptic_event_t_get_type_info(), type[3] = palpate_haptic_status_t_get_type_info();
     type[4] = palpate_haptic_config_t_get_type_info(), type[5] = palpate_body_frame_t_get_type_info();
     type[6] = palpate_session_status_t_get_type_info();
-    for (int i = 0; i < 7; i++) n[i] = encoded(type[i], message[i], bytes[i], 4096);
-    return 7;
+    for (int i = 0; i < N_TYPE; i++) n[i] = encoded(type[i], message[i], bytes[i], 4096);
+    return N_TYPE;
 }
 
 static void walk_passes_whole_messages_and_refuses_every_cut(void)
 {
-    static uint8_t bytes[8][4096];
-    size_t n[8];
-    const lcm_type_info_t *type[8];
+    static uint8_t bytes[N_TYPE][4096];
+    size_t n[N_TYPE];
+    const lcm_type_info_t *type[N_TYPE];
     const int count = all_messages(bytes, n, type);
     for (int i = 0; i < count; i++) {
         CHECK(n[i] > 8);
@@ -130,9 +143,9 @@ static void walk_passes_whole_messages_and_refuses_every_cut(void)
 
 static void walk_refuses_lying_counts_and_strings(void)
 {
-    static uint8_t bytes[8][4096];
-    size_t n[8];
-    const lcm_type_info_t *type[8];
+    static uint8_t bytes[N_TYPE][4096];
+    size_t n[N_TYPE];
+    const lcm_type_info_t *type[N_TYPE];
     all_messages(bytes, n, type);
     /* haptic_model: n_patch stands at 161 */
     CHECK_INT(bytes[1][161], 4);
@@ -177,9 +190,9 @@ static void walk_refuses_numbers_that_are_not_finite(void)
  */
 static void what_the_walk_passes_decodes(void)
 {
-    static uint8_t bytes[8][4096];
-    size_t n[8];
-    const lcm_type_info_t *type[8];
+    static uint8_t bytes[N_TYPE][4096];
+    size_t n[N_TYPE];
+    const lcm_type_info_t *type[N_TYPE];
     const int count = all_messages(bytes, n, type);
     const uint8_t values[] = {0, 1, 0x7f, 0x80, 0xff};
     int passed = 0;
@@ -290,16 +303,17 @@ static void haptic_model_survives_the_way_to_lcm_and_back(void)
 static int heard, refused;
 static pal_wire_pose heard_pose;
 static char heard_channel[64];
-static void on_message(void *user, const char *channel, const void *bytes, size_t n_byte)
+static void on_message(void *user, const char *channel, const void *bytes, size_t n_byte, uint64_t source)
 {
     (void)user;
+    CHECK(source != 0);
     heard += pal_lcm_to_pose(bytes, n_byte, &heard_pose) == PAL_ERR_OK;
     snprintf(heard_channel, sizeof heard_channel, "%s", channel);
 }
-static void on_refused(void *user, const char *channel, pal_walk reason)
+static void on_refused(void *user, const char *channel, const char *reason)
 {
     (void)user, (void)channel;
-    refused += reason == PAL_WALK_TYPE;
+    refused += !strcmp(reason, pal_walk_text(PAL_WALK_TYPE));
 }
 
 static void states_of_many_tools_come_through_the_memory_bus(void)
@@ -329,9 +343,9 @@ static void states_of_many_tools_come_through_the_memory_bus(void)
 }
 
 static size_t n_byte_heard;
-static void on_frame(void *user, const char *channel, const void *bytes, size_t n_byte)
+static void on_frame(void *user, const char *channel, const void *bytes, size_t n_byte, uint64_t source)
 {
-    (void)user, (void)channel;
+    (void)user, (void)channel, (void)source;
     palpate_body_frame_t frame;
     if (palpate_body_frame_t_decode(bytes, 0, (int)n_byte, &frame) < 0) return;
     bool same = true;

@@ -1,12 +1,16 @@
 /* Bytes from a bus: the length walk over each type of the package, and what it passes through the generated decoder and
  * our conversion. The first byte chooses the type; the fingerprint is put in, so that the fields are reached. */
 #include "clients/link/lcm_convert.h"
+#include "clients/link/lcm_seal.h"
 #include "lcmtypes/lcm_walk.h"
+#include "palpate_answer_t.h"
 #include "palpate_body_frame_t.h"
 #include "palpate_haptic_config_t.h"
 #include "palpate_haptic_event_t.h"
 #include "palpate_haptic_status_t.h"
+#include "palpate_order_t.h"
 #include "palpate_session_status_t.h"
+#include "palpate_triangles_t.h"
 
 #include <stdint.h>
 #include <stdlib.h>
@@ -17,10 +21,17 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte);
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
 {
     const lcm_type_info_t *const type[] = {
-        palpate_tool_state_t_get_type_info(),    palpate_haptic_model_t_get_type_info(),
-        palpate_haptic_event_t_get_type_info(),  palpate_haptic_status_t_get_type_info(),
-        palpate_haptic_config_t_get_type_info(), palpate_body_frame_t_get_type_info(),
-        palpate_session_status_t_get_type_info()};
+        palpate_tool_state_t_get_type_info(),     palpate_haptic_model_t_get_type_info(),
+        palpate_haptic_event_t_get_type_info(),   palpate_haptic_status_t_get_type_info(),
+        palpate_haptic_config_t_get_type_info(),  palpate_body_frame_t_get_type_info(),
+        palpate_session_status_t_get_type_info(), palpate_order_t_get_type_info(),
+        palpate_answer_t_get_type_info(),         palpate_triangles_t_get_type_info()};
+    static pal_seal_senders senders;
+    static const pal_keys keys = {.n = 1};
+    size_t n_sealed = n_byte;
+    uint64_t source;
+    if (!pal_seal_admit(&senders, "a", bytes, &n_sealed, n_byte & 1 ? &keys : NULL, 1, 1, &source) && n_sealed > n_byte)
+        abort();
     if (n_byte < 9 || n_byte > 1 << 20) return 0;
     const unsigned which = bytes[0] % (sizeof type / sizeof type[0]);
     const size_t n = n_byte - 1;

@@ -141,7 +141,7 @@ static void keys_are_replaced_while_the_server_runs(void)
     begin(false);
     strcpy(old, sign((pal_ticket){.role = PAL_WIRE_ROLE_TRAINEE}));
     CHECK_TEXT(refusal(old, NOW_S, 0, &grant), "");
-    REQUIRE(!pal_ticket_keys_add(keys_path, &id, &diag));
+    REQUIRE(!pal_key_file_add(keys_path, &id, &diag));
     CHECK_INT(id, 2);
     age_file(2000);
     REQUIRE(!pal_ticket_keys_read(keys_path, &keys, &diag));
@@ -195,7 +195,7 @@ int main(void)
 {
     pal_diagnostic diag = {""};
     int id = 0, fd = mkstemp(keys_path);
-    if (fd < 0 || close(fd) || unlink(keys_path) || pal_ticket_keys_add(keys_path, &id, &diag)) return 1;
+    if (fd < 0 || close(fd) || unlink(keys_path) || pal_key_file_add(keys_path, &id, &diag)) return 1;
     RUN(without_a_ticket_one_watches);
     RUN(a_ticket_is_for_its_session_and_its_time);
     RUN(a_ticket_for_one_admits_one_who_may_return);

@@ -213,6 +213,29 @@ static void a_body_asleep_is_neither_stepped_nor_encoded(void)
     organ.scene.body[0].effect[0] = gravity;
 }
 
+/* while paused a tool is shown in frames that no step has made */
+static void the_histogram_counts_steps(void)
+{
+    static mem_client ada;
+    const char *name = "palpate_sim_step_seconds_by_session_count{session=\"0\"}";
+    begin(false);
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, 0);
+    UNTIL(ada.n_tools > 30, &ada, NULL);
+    mem_text(&ada, "{\"type\":\"command\",\"verb\":\"pause\"}");
+    UNTIL(ada.last[PAL_CONTROL_STATUS].status.paused, &ada, NULL);
+    const double n_step = counter(name);
+    const int n_tools = ada.n_tools;
+    CHECK(n_step > 0);
+    for (uint32_t seq = 1; seq <= 40; seq++) {
+        mem_pose(&ada, 0, seq, (const double[3]){1e-4 * seq, 0, 0.2});
+        turn(&ada, NULL);
+    }
+    CHECK(ada.n_tools > n_tools + 5);
+    CHECK_NEAR(counter(name), n_step, 0);
+    mem_end(&ada);
+    end();
+}
+
 int main(void)
 {
     if (!small_scene_make(&organ, "small")) return 1;
@@ -221,6 +244,7 @@ int main(void)
     RUN(an_instructor_switches_a_component_and_all_are_told);
     RUN(others_do_not_and_bad_orders_are_refused);
     RUN(a_body_asleep_is_neither_stepped_nor_encoded);
+    RUN(the_histogram_counts_steps);
     RUN(everybody_resets_what_was_stopped_and_a_viewer_nothing_else);
     pal_prepared_free(&organ.mesh);
     return check_report();

@@ -2,6 +2,7 @@
  * of the force on the hand in N, speed in m/s, number of that model. Ends on a signal. usage: watch_force BUS CHANNEL
  */
 #include "clients/link/lcm_link.h"
+#include "clients/link/lcm_seal.h"
 #include "palpate_tool_state_t.h"
 #include "server/base/vec3.h"
 
@@ -12,7 +13,9 @@ static void watch_state(const lcm_recv_buf_t *buffer, const char *channel, void 
 {
     (void)channel, (void)user;
     palpate_tool_state_t s;
-    if (pal_lcm_walk(palpate_tool_state_t_get_type_info(), buffer->data, buffer->data_size)) return;
+    if (pal_lcm_walk(palpate_tool_state_t_get_type_info(), buffer->data,
+                     pal_seal_begin(buffer->data, buffer->data_size)))
+        return;
     if (palpate_tool_state_t_decode(buffer->data, 0, (int)buffer->data_size, &s) < 0) return;
     const double force[3] = {s.force[0], s.force[1], s.force[2]}, speed[3] = {s.vel[0], s.vel[1], s.vel[2]};
     printf("%.6f %.6f %.6f %d\n", (double)(uint32_t)s.model_age_us * 1e-6, pal_norm3(force), pal_norm3(speed),

@@ -1,0 +1,78 @@
+/* Gives an order on the bus, three times as senders do, and prints what the session says: "done TEXT" or "refused CODE
+ * TEXT". With N of TRIANGLES it waits for so many tables of triangles instead, and prints the triangles of the last.
+ * Ends with 1 when nothing comes within 20 s. usage: order_lcm BUS SESSION KEY_FILE|- VERB|TRIANGLES [KEY=VALUE|N]...
+ */
+#include "clients/link/lcm_link.h"
+#include "palpate_answer_t.h"
+#include "palpate_order_t.h"
+#include "palpate_triangles_t.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static pal_link_loop *loop;
+static pal_lcm_link *lcm;
+static palpate_order_t order;
+static const char *session;
+static int n_heard, n_wanted;
+
+static void heard(void *user, const char *channel, const void *bytes, size_t n_byte, uint64_t source)
+{
+    (void)user, (void)source;
+    palpate_answer_t answer;
+    palpate_triangles_t triangles;
+    if (n_wanted && strstr(channel, "/TRIANGLES/")) {
+        if (palpate_triangles_t_decode(bytes, 0, (int)n_byte, &triangles) < 0 || ++n_heard < n_wanted) return;
+        printf("%d\n", triangles.n_corner / 3);
+        palpate_triangles_t_decode_cleanup(&triangles);
+    } else if (!n_wanted && strstr(channel, "/ANSWER")) {
+        if (palpate_answer_t_decode(bytes, 0, (int)n_byte, &answer) < 0) return;
+        if (answer.seq != order.seq) return;
+        printf(answer.done ? "done%s %s\n" : "refused %s %s\n", answer.code, answer.text);
+        palpate_answer_t_decode_cleanup(&answer);
+        n_heard++;
+    } else {
+        return;
+    }
+    fflush(stdout);
+    pal_link_stop(loop);
+}
+
+static void give(void *user)
+{
+    static int n_given;
+    (void)user;
+    if (n_given++ < 3) (void)pal_lcm_link_publish(lcm, session, "ORDER", -1, palpate_order_t_get_type_info(), &order);
+}
+
+int main(int argc, char **argv)
+{
+    static const pal_lcm_events events = {heard, NULL};
+    static char *key[16], none[] = "";
+    static double value[16];
+    pal_diagnostic diag = {""};
+    char channel[64];
+    if (argc < 5) return 2;
+    session = argv[2];
+    order = (palpate_order_t){
+        .seq = 1, .version = PAL_LCM_VERSION, .verb = argv[4], .target = none, .key = key, .value = value};
+    if (!strcmp(argv[4], "TRIANGLES")) n_wanted = argc > 5 ? atoi(argv[5]) : 1;
+    for (int i = 5; i < argc && !n_wanted; i++) {
+        char *equal = strchr(argv[i], '=');
+        if (!equal) return 2;
+        *equal = 0, key[order.n_arg] = argv[i], value[order.n_arg++] = atof(equal + 1);
+    }
+    pal_err err = pal_link_loop_create(&loop);
+    if (!err) err = pal_lcm_link_open(loop, argv[1], &events, NULL, &diag, &lcm);
+    if (!err && strcmp(argv[3], "-")) err = pal_lcm_link_use_keys(lcm, argv[3], &diag);
+    pal_lcm_channel(channel, session, "ANSWER", -1);
+    if (!err) err = pal_lcm_link_subscribe(lcm, channel, palpate_answer_t_get_type_info());
+    if (!err) err = pal_lcm_link_subscribe(lcm, "PALPATE1/.*/TRIANGLES/.*", palpate_triangles_t_get_type_info());
+    if (!err && !n_wanted && !pal_link_add_timer(loop, 200000, give, NULL)) err = PAL_ERR_MEMORY;
+    if (err) fprintf(stderr, "order_lcm: %s\n", diag.text);
+    if (!err) pal_link_run_for(loop, 20);
+    pal_link_loop_destroy(loop);
+    pal_lcm_link_close(lcm);
+    return err || n_heard == 0;
+}

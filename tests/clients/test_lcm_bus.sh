@@ -1,0 +1,63 @@
+#!/bin/sh
+# Two rigs on one bus, with a key: each server moves with its own devices alone, a host without the key moves nothing and hears
+# nobody, orders act by the ticket of palpate-lcm, and listeners get the triangles of a surface that adapts.
+# In a network namespace of its own. usage: test_lcm_bus.sh FOLDER_OF_PROGRAMS FORGE_PROGRAM FAKES ORDER_PROGRAM
+bin=$1 order=$4
+. "$(dirname "$0")/rig.sh"
+own_network "$@"
+bus='udpm://239.255.76.67:7667?ttl=0'
+"$bin/palpate" ticket --keys "$work/bus.keys" --new-key >/dev/null
+"$bin/palpate" ticket --keys "$work/other.keys" --new-key >/dev/null
+
+# a ball, whoever comes is what it asks to be; and an adaptive sphere, where palpate-lcm is a trainee
+make_scene
+start_server --port 8090 --lcm "$bus" --lcm-key "$work/bus.keys" --log info
+shows "$work/serve.err" $server_job lcm_joined
+check "the first rig's palpate-lcm has joined" $? == 0
+cp "$work/serve.err" "$work/first.err"
+"$bin/palpate" prepare --model adaptive --shape sphere --levels 3 -o "$work/sphere" --quiet || exit 1
+timeout 280 "$bin/palpate" serve "$work/sphere/scene.json" --port 8091 --lcm "$bus" --lcm-key "$work/bus.keys" \
+    --log info --json >"$work/second.out" 2>"$work/second.err" &
+second=$!
+pids="$pids $second"
+shows "$work/second.err" $second lcm_joined
+check "the second rig's has too" $? == 0
+sphere=$(json sessions "$work/second.out" | tr -d '[]"')
+[ -n "$sphere" ] || sphere=$(sed -n 's/.*"sessions":\["\([^"]*\)".*/\1/p' "$work/second.out")
+
+bridge() { # NAME SESSION flags
+    name=$1 of=$2
+    shift 2
+    timeout 60 "$bin/palpate-bridge" --server "$bus" --session "$of" --origin 0,0,0.048 --device "$(device touch)" --json "$@" \
+        >"$work/$name" 2>"$work/$name.err"
+}
+bridge own ball --tool 0 --lcm-key "$work/bus.keys" --until models=60,force_N=0.06
+check "a device with the key feels the first rig's ball" $? == 0
+bridge none ball --tool 1 --seconds 3
+check "one without the key gets no model" "$(json models "$work/none")" == 0
+bridge wrong ball --tool 1 --lcm-key "$work/other.keys" --seconds 3
+check "nor one with another key" "$(json models "$work/wrong")" == 0
+check "and palpate-lcm says why" "$(grep -c 'not signed with the key' "$work/serve.err")" '>' 0
+curl -s http://127.0.0.1:8091/sessions >"$work/sessions"
+check "nobody took a tool of the second rig" "$(json free_tools "$work/sessions")" == "$(json tools "$work/sessions")"
+
+# orders
+reply=$("$order" "$bus" ball "$work/bus.keys" configure size=1)
+check "an order on the bus is answered" "$(echo "$reply" | grep -c '^done\|^refused')" == 1
+reply=$("$order" "$bus" "$sphere" "$work/bus.keys" pause)
+check "a trainee's ticket does not pause" "$(echo "$reply" | grep -c '^refused role')" == 1
+"$order" "$bus" ball - material young_Pa=9000 >/dev/null &
+unsigned=$!
+wait $unsigned
+check "an order without the key is not heard" $? == 1
+
+# triangles of the surface that adapts: those of the asset, then more where it is pulled
+check "a late listener gets the present triangles" "$("$order" "$bus" "$sphere" "$work/bus.keys" TRIANGLES 1)" == 224
+PALPATE_TICKET=$(sed -n 's/.*"trainee":"\([^"]*\)".*/\1/p' "$work/second.out") timeout 60 "$bin/palpate-client" "ws://127.0.0.1:8091/ws" \
+    --json --script pull --seconds 50 --until deltas=4,triangles=230 >"$work/pull" 2>"$work/pull.err" &
+pull=$!
+most=$("$order" "$bus" "$sphere" "$work/bus.keys" TRIANGLES 6)
+check "and more of them while it is pulled" "$most" '>' 224
+wait $pull
+check "which a websocket client confirms" $? == 0
+finish
