@@ -57,7 +57,7 @@ struct pal_lcm_bridge {
     bridge_part part[PAL_WIRE_PART_MAX];
     bridge_tool tool[PAL_WIRE_TOOL_MAX];
     uint32_t status_seq, n_tool;
-    uint64_t status_ns, told_ns, other_ns; /* when a refusal, and another bridge, were last logged */
+    uint64_t status_ns, logged_ns, other_ns; /* when a refusal, and another bridge, were last logged */
     pal_lcm_bridge_counts count;
 };
 
@@ -356,9 +356,9 @@ static void bridge_lcm_refused(void *user, const char *channel, const char *reas
     pal_lcm_bridge *b = user;
     const uint64_t now = pal_clock_ns();
     b->count.n_state_refused++;
-    const bool told = b->told_ns && now - b->told_ns < REPEAT_NS;
-    pal_log(told ? PAL_LOG_DEBUG : PAL_LOG_WARN, "lcm_refused", "%.63s: %s", channel, reason);
-    if (!told) b->told_ns = now;
+    const bool logged = b->logged_ns && now - b->logged_ns < REPEAT_NS;
+    pal_log(logged ? PAL_LOG_DEBUG : PAL_LOG_WARN, "lcm_refused", "%.63s: %s", channel, reason);
+    if (!logged) b->logged_ns = now;
 }
 
 /* four times a second: releases tools without states, requests tools that were refused, and repeats parts at rest and

@@ -80,6 +80,9 @@ void pal_hub_leave_room(pal_client *c)
     unsubscribe_all(c);
     pal_member_entry *member = pal_members_find(&room->members, c->id);
     int tool = member ? member->tool : -1;
+    if (member)
+        pal_log(PAL_LOG_INFO, "leave", "%s (member %d) leaves %s", member->name, c->id,
+                pal_session_scene(room->session)->name);
     pal_members_leave(&room->members, c->id);
     if (tool >= 0) pal_hub_release_tool(room, tool);
     room->tier_users[c->tier]--;
@@ -97,7 +100,8 @@ void pal_hub_drop(pal_client *client, int code, const char *format, ...)
     va_start(args, format);
     vsnprintf(reason, sizeof reason, format, args);
     va_end(args);
-    pal_log(PAL_LOG_DEBUG, "drop", "a client is closed with %d: %s", code, reason);
+    pal_log(PAL_LOG_INFO, "drop", "%s from %s is closed with %d: %s", client->id ? "a member" : "a client",
+            client->peer->address[0] ? client->peer->address : "this process", code, reason);
     pal_peer_drop(client->peer, code, "%s", reason);
     pal_hub_leave_room(client);
 }
