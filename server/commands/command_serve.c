@@ -11,14 +11,11 @@
 #include "server/cli/config.h"
 #include "server/cli/report.h"
 #include "server/commands/commands.h"
-#include "server/commands/preflight_report.h"
+#include "server/commands/served_scene.h"
 #include "server/commands/tuning.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/net/hub_verb.h"
 #include "server/net/server.h"
-#include "server/scene/scene_arg.h"
-#include "server/session/resume.h"
-#include "server/study/studied_scene.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -47,19 +44,16 @@ typedef struct lcm_child {
 typedef struct serve_run {
     pal_flag_common common;
     pal_config config;
-    pal_surface_scene surface; /* how bare surfaces are prepared */
+    pal_served_options options;
     int n;
-    pal_loaded_scene *scene[MAX_SESSIONS];
-    const char *word[MAX_SESSIONS];          /* the operand; NULL: none                        */
-    pal_studied_scene studied[MAX_SESSIONS]; /* in the configuration that the scene asks for   */
-    pal_preflight preflight[MAX_SESSIONS];
-    pal_session *session[MAX_SESSIONS];
-    pal_resume *resume[MAX_SESSIONS]; /* what a session goes on with; NULL: nothing */
-    bool resumes;
-    const char *replay; /* a recording of the only scene, which it plays; NULL: none */
-    pal_session_recording recording;
-    char record[PAL_CONFIG_TEXT + PAL_NAME + 2];
-    pal_session_study study[MAX_SESSIONS]; /* borrowed by the server */
+    pal_served_scene served[MAX_SESSIONS];
+    pal_session *session[MAX_SESSIONS]; /* NULL: the server has closed it, or will */
+    pal_resume *resume[MAX_SESSIONS];   /* borrowed by the server, as what follows */
+    pal_session_study study[MAX_SESSIONS];
+    pal_session_recording recording[MAX_SESSIONS];
+    const char *scenes; /* folder of scenes that are opened while it runs; NULL: none */
+    pal_scene_folder folder;
+    pal_session_source source;
     pal_server_gate gate;
     pal_server *server;
     lcm_child lcm[MAX_SESSIONS];
@@ -94,96 +88,62 @@ static const char *viewer_folder(const pal_config *config, char *folder, size_t 
 
 /* ---- scenes and sessions ---- */
 
-static pal_err load_input(serve_run *run, const char *path, pal_diagnostic *diag)
-{
-    pal_surface_scene_report report;
-    pal_loaded_scene **out = &run->scene[run->n];
-    bool is_surface = false;
-    if (path)
-        PAL_TRY(pal_scene_arg(path, &run->surface, out, &is_surface, &report, diag));
-    else
-        PAL_TRY(pal_scene_procedural(&run->surface, out, &report, diag));
-    if (is_surface && !run->common.quiet && !run->common.json)
-        printf("palpate: %s: %lld triangles, resolution %d, unit %s (%g m)%s\n", path,
-               (long long)report.surface.n_tri_read, report.resolution, report.unit_name, report.unit_m,
-               report.unit_guessed ? ", guessed from its size (--units overrides)" : "");
-    run->word[run->n++] = path;
-    return PAL_ERR_OK;
-}
-
 /* the second scene of one name becomes name-2 */
-static void make_unique(serve_run *run, int index)
+static void make_unique(serve_run *run, pal_served_scene *served)
 {
-    char *name = run->scene[index]->scene.name, base[PAL_NAME];
+    char *name = served->scene->scene.name, base[PAL_NAME];
     memcpy(base, name, PAL_NAME);
-    for (int number = 2, i = 0; i < index; i++)
-        if (!strcmp(run->scene[i]->scene.name, name)) {
+    for (int number = 2, i = 0; i < run->n; i++)
+        if (!strcmp(run->served[i].scene->scene.name, name)) {
             snprintf(name, PAL_NAME, "%.*s-%d", PAL_NAME - 8, base, number++ % 10000);
             i = -1;
         }
 }
 
-/* the configurations that scenes ask for, and those that their sessions may switch to */
-static pal_err open_studies(serve_run *run, pal_diagnostic *diag)
+static pal_err open_input(serve_run *run, const char *path, pal_diagnostic *diag)
 {
-    for (int i = 0; i < run->n; i++) {
-        pal_studied_scene *s = &run->studied[i];
-        const pal_scene *scene = &run->scene[i]->scene;
-        *s = (pal_studied_scene){.scene = scene, .picked = -1};
-        if (!run->word[i]) continue;
-        PAL_TRY(pal_studied_scene_open(run->word[i], scene, s, diag));
-        if (s->warn[0]) pal_log(PAL_LOG_WARN, "study", "%s", s->warn);
-        if (s->summary[0]) pal_log(PAL_LOG_INFO, "study", "%s", s->summary);
-    }
+    pal_served_scene *served = &run->served[run->n];
+    pal_surface_scene_report report;
+    bool is_surface;
+    PAL_TRY(pal_served_scene_load(&run->options, path, served, &is_surface, &report, diag));
+    if (is_surface && !run->common.quiet && !run->common.json)
+        printf("palpate: %s: %lld triangles, resolution %d, unit %s (%g m)%s\n", path,
+               (long long)report.surface.n_tri_read, report.resolution, report.unit_name, report.unit_m,
+               report.unit_guessed ? ", guessed from its size (--units overrides)" : "");
+    make_unique(run, served);
+    PAL_TRY(pal_served_scene_open(&run->options, served, diag));
+    const int i = run->n++;
+    run->session[i] = served->opened.session;
+    run->resume[i] = served->opened.resume;
+    run->study[i] = served->opened.study;
+    run->recording[i] = served->opened.recording;
     return PAL_ERR_OK;
 }
 
-/* at its beginning, paused */
-static pal_err open_recording(serve_run *run, pal_session_options *options, pal_diagnostic *diag)
+/* one bad scene stops no other, but a server without a session is none */
+static pal_err open_inputs(serve_run *run, const char *const *input, int n_input, pal_diagnostic *diag)
 {
-    pal_recording *recording;
-    PAL_TRY(pal_recording_open(run->replay, run->studied[0].scene, diag, &recording));
-    run->recording = (pal_session_recording){.recording = recording, .record_path = options->record_path};
-    if (pal_recording_cut(recording)[0])
-        pal_log(PAL_LOG_WARN, "replay", "%s is played up to its last whole record", pal_recording_cut(recording));
-    pal_log(PAL_LOG_INFO, "replay", "%s: %.1f s", run->replay, pal_recording_length_s(recording));
-    PAL_TRY(pal_recording_seek(recording, 0, false, diag, &run->resume[0]));
-    options->plays = options->start_paused = true;
-    options->record_path = NULL; /* until it goes on live */
-    return PAL_ERR_OK;
-}
-
-static pal_err open_sessions(serve_run *run, pal_diagnostic *diag)
-{
-    char *record = run->record;
-    for (int i = 0; i < run->n; i++) {
-        const pal_scene *scene = run->studied[i].scene;
-        PAL_TRY(pal_preflight_run(scene, &run->preflight[i], diag));
-        pal_session_options options = {.wake = pal_server_gate_wake, .user = &run->gate, .only_observed = true};
-        snprintf(record, sizeof run->record, run->n > 1 ? "%s.%s" : "%s", run->config.record, scene->name);
-        if (run->config.record[0]) options.record_path = record;
-        if (run->resumes) PAL_TRY(pal_resume_open(record, scene, diag, &run->resume[i]));
-        if (run->replay) PAL_TRY(open_recording(run, &options, diag));
-        options.resume = run->resume[i];
-        if (run->resume[i] && run->resumes)
-            pal_log(PAL_LOG_INFO, "resume", "%s goes on where %s ends, after %.1f s", scene->name,
-                    pal_resume_name(run->resume[i]), pal_resume_time_s(run->resume[i]));
-        PAL_TRY(pal_session_open(run->resume[i] ? pal_resume_scene(run->resume[i]) : scene, &options, diag,
-                                 &run->session[i]));
+    run->options.record = run->config.record;
+    run->options.record_by_name = n_input > 1 || run->scenes;
+    run->options.wake = pal_server_gate_wake, run->options.user = &run->gate;
+    for (int i = 0; i < (n_input ? n_input : 1); i++) {
+        pal_diagnostic bad = {""};
+        pal_err err = open_input(run, n_input ? input[i] : NULL, &bad);
+        if (!err) continue;
+        pal_served_scene_close(&run->served[run->n]);
+        if (!bad.text[0]) pal_diagnostic_set(&bad, err, "%s", pal_err_text(err));
+        *diag = bad;
+        if (n_input < 2 || (i == n_input - 1 && run->n == 0)) return err;
+        pal_log(PAL_LOG_ERROR, "session", "%s is not served: %s", input[i], bad.text);
     }
+    pal_report_progress(NULL, 0, &run->common);
+    run->options.surface.progress = NULL; /* of what is opened later nobody at this terminal wants to know */
     return PAL_ERR_OK;
 }
 
 static pal_err open_server(serve_run *run, pal_diagnostic *diag)
 {
     char folder[PATH_MAX + 32];
-    for (int i = 0; i < run->n; i++) {
-        const pal_studied_scene *studied = &run->studied[i];
-        run->study[i] = (pal_session_study){.configuration = studied->configuration,
-                                            .n = studied->n_configuration,
-                                            .body = studied->body,
-                                            .reference_m = studied->file ? studied->file->study.reference_m : NAN};
-    }
     pal_server_options options = {.listen = run->config.listen,
                                   .port = run->config.port,
                                   .allow_remote = run->config.allow_remote,
@@ -198,13 +158,14 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
                                   .max_clients = run->config.max_clients,
                                   .resume = run->resume,
                                   .study = run->study,
-                                  .recording = run->replay ? &run->recording : NULL};
+                                  .recording = run->recording,
+                                  .source = run->scenes ? &run->source : NULL};
     PAL_TRY(pal_server_open(&options, run->session, run->n, diag, &run->server));
     if (!options.viewer_folder)
         pal_log(PAL_LOG_WARN, "viewer", "no viewer to serve: neither beside the program nor given with --viewer");
     pal_server_connect(run->server, &run->gate);
     /* last: a refusal prints nothing else */
-    for (int i = 0; i < run->n; i++) pal_preflight_log(&run->preflight[i], run->studied[i].scene->name);
+    for (int i = 0; i < run->n; i++) pal_preflight_log(&run->served[i].preflight, run->served[i].studied.scene->name);
     return PAL_ERR_OK;
 }
 
@@ -225,7 +186,7 @@ static int announce(const serve_run *run)
     for (int r = 0; r < PAL_WIRE_ROLE_COUNT; r++) pal_server_start_ticket(run->server, (pal_wire_role)r, ticket[r]);
     if (run->common.json) {
         cJSON *sessions = cJSON_CreateArray(), *tickets = cJSON_CreateObject();
-        for (int i = 0; i < run->n; i++) cJSON_AddItemToArray(sessions, JSON_TEXT(run->scene[i]->scene.name));
+        for (int i = 0; i < run->n; i++) cJSON_AddItemToArray(sessions, JSON_TEXT(run->served[i].scene->scene.name));
         for (int r = 0; r < PAL_WIRE_ROLE_COUNT; r++)
             cJSON_AddItemToObject(tickets, pal_wire_role_name((pal_wire_role)r), JSON_TEXT(ticket[r]));
         snprintf(own, sizeof own, "%s%s%s", url, run->config.open ? "" : "#",
@@ -246,8 +207,8 @@ static int announce(const serve_run *run)
         printf("palpate: whoever opens %s without the part behind # may only watch\n", url);
     }
     for (int i = 1; i < run->n; i++)
-        printf("palpate: with ?session=%s before the # for the session %s\n", run->scene[i]->scene.name,
-               run->scene[i]->scene.name);
+        printf("palpate: with ?session=%s before the # for the session %s\n", run->served[i].scene->scene.name,
+               run->served[i].scene->scene.name);
     fflush(stdout);
     return 0;
 }
@@ -288,7 +249,7 @@ static pal_err find_lcm(serve_run *run, pal_diagnostic *diag)
     if (setenv("PALPATE_TICKET", ticket, true)) return PAL_ERR_MEMORY;
     for (int i = 0; i < run->n; i++)
         snprintf(run->lcm[i].server, MAX_URL, "ws%s://%s/ws?session=%s", run->config.tls_cert[0] ? "s" : "", address,
-                 run->scene[i]->scene.name);
+                 run->served[i].scene->scene.name);
     return PAL_ERR_OK;
 }
 
@@ -393,14 +354,13 @@ static void *net_main(void *user)
     return NULL;
 }
 
-static pal_err run_all(serve_run *run, pal_diagnostic *diag)
+static pal_err run_all(serve_run *run, const char *const *input, int n_input, pal_diagnostic *diag)
 {
     struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_RESTART};
     sem_init(&woken, 0, 0);
     for (int k = 0; k < N_HANDLED; k++) sigaction(handled_signal[k], &action, NULL);
     signal(SIGPIPE, SIG_IGN);
-    PAL_TRY(open_studies(run, diag));
-    PAL_TRY(open_sessions(run, diag));
+    PAL_TRY(open_inputs(run, input, n_input, diag));
     PAL_TRY(open_server(run, diag));
     PAL_TRY(find_lcm(run, diag));
     if (pal_thread_start(&run->net_thread, net_main, run)) return PAL_ERR_INTERNAL;
@@ -437,10 +397,12 @@ int command_serve(int argc, char **argv)
         {"--largest", NULL, PAL_FLAG_SWITCH, &largest_only, 0, 0,
          "keep the largest of several components of a surface or of cells only (see palpate prepare --help)"},
         {"--seconds", "S", PAL_FLAG_NUMBER, &run.seconds, 0.1, 1e9, "end after so long (a signal ends it)"},
-        {"--resume", NULL, PAL_FLAG_SWITCH, &run.resumes, 0, 0,
+        {"--resume", NULL, PAL_FLAG_SWITCH, &run.options.resumes, 0, 0,
          "go on where the newest recording of --record ends, after a crash too"},
-        {"--replay", "LOG", PAL_FLAG_TEXT, &run.replay, 0, 0,
+        {"--replay", "LOG", PAL_FLAG_TEXT, &run.options.replay, 0, 0,
          "play a recording of the scene: pause, seek, speed, and go on live from any moment (recorded with --record)"},
+        {"--scenes", "FOLDER", PAL_FLAG_TEXT, &run.scenes, 0, 0,
+         "instructors open its scenes as sessions, and end sessions, while the server runs"},
         {"--help-protocol", NULL, PAL_FLAG_SWITCH, &help_protocol, 0, 0,
          "print the commands that clients may give: name, who, numbers, what it does"},
     };
@@ -463,33 +425,34 @@ int command_serve(int argc, char **argv)
         return 0;
     }
     pal_log_set_level(run.common.quiet ? PAL_LOG_ERROR : pal_config_log_level(&run.config));
-    run.surface = (pal_surface_scene){.resolution = resolution,
-                                      .label = label,
-                                      .largest_only = largest_only,
-                                      .unit_m = unit ? pal_mesh_unit_named(unit) : 0,
-                                      .progress = pal_report_progress,
-                                      .user = &run.common};
+    run.options.surface = (pal_surface_scene){.resolution = resolution,
+                                              .label = label,
+                                              .largest_only = largest_only,
+                                              .unit_m = unit ? pal_mesh_unit_named(unit) : 0,
+                                              .progress = pal_report_progress,
+                                              .user = &run.common};
     pal_err err = PAL_ERR_OK;
-    if (run.resumes && !run.config.record[0])
+    if (run.options.resumes && !run.config.record[0])
         err = PAL_REFUSE(&diag, "--resume needs --record FILE, with which it goes on");
-    if (!err && run.replay && (run.resumes || n_input > 1))
+    if (!err && run.options.replay && (run.options.resumes || n_input > 1))
         err = PAL_REFUSE(&diag,
-                         run.resumes ? "--replay and --resume: a recording either plays or goes on"
-                                     : "--replay: a recording is of one scene, and %d are given",
+                         run.options.resumes ? "--replay and --resume: a recording either plays or goes on"
+                                             : "--replay: a recording is of one scene, and %d are given",
                          n_input);
-    if (!err && unit && run.surface.unit_m == 0) err = PAL_REFUSE(&diag, "--units: \"%.20s\" is not a unit", unit);
-    for (int i = 0; !err && i < (n_input ? n_input : 1); i++) err = load_input(&run, n_input ? input[i] : NULL, &diag);
-    pal_report_progress(NULL, 0, &run.common);
-    for (int i = 0; i < run.n; i++) make_unique(&run, i);
-    if (!err) err = run_all(&run, &diag);
+    if (!err && unit && run.options.surface.unit_m == 0)
+        err = PAL_REFUSE(&diag, "--units: \"%.20s\" is not a unit", unit);
+    if (!err && run.scenes) {
+        err = pal_scene_folder_check(run.scenes, &diag);
+        snprintf(run.folder.path, sizeof run.folder.path, "%s", run.scenes);
+        run.folder.options = &run.options;
+        run.source = pal_scene_folder_source(&run.folder);
+    }
+    if (!err) err = run_all(&run, input, n_input, &diag);
     const int record_error = run.server && !err ? pal_server_record_error(run.server) : 0;
     if (record_error)
         err = pal_diagnostic_set(&diag, PAL_ERR_IO, "a recording ended before its session: %s", strerror(record_error));
     pal_server_close(run.server);
     for (int i = 0; i < run.n; i++) pal_session_close(run.session[i]);
-    for (int i = 0; i < run.n; i++) pal_resume_free(run.resume[i]);
-    pal_recording_close((pal_recording *)(uintptr_t)run.recording.recording);
-    for (int i = 0; i < run.n; i++) pal_studied_scene_close(&run.studied[i]);
-    for (int i = 0; i < run.n; i++) pal_scene_free(run.scene[i]);
+    for (int i = 0; i < run.n; i++) pal_served_scene_close(&run.served[i]);
     return err ? pal_report_refusal(&run.common, err, &diag) : 0;
 }

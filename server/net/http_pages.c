@@ -1,8 +1,10 @@
-/* Responses to GET other than the viewer's files: assets, health, readiness, sessions, metrics. Label values of
+/* Responses to requests other than the viewer's files: assets, health, readiness, sessions, metrics. Label values of
  * metrics stay few: never names of sessions or members. */
 #include "server/net/http_pages.h"
 
 #include "server/base/json_members.h"
+#include "server/net/hub_rights.h"
+#include "server/net/hub_sessions.h"
 #include "server/net/transport/plain_text.h"
 #include "server/net/tuning.h"
 
@@ -10,6 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 static void reply_text(pal_reply *reply, int status, const char *type, const char *text, size_t n)
 {
@@ -24,10 +27,11 @@ static void reply_plain(pal_reply *reply, int status, const char *text)
     reply_text(reply, status, "text/plain; charset=utf-8", text, strlen(text));
 }
 
-static void get_health(pal_hub *hub, pal_reply *reply)
+static void get_health(pal_hub *hub, const pal_request *request, pal_reply *reply)
 {
+    (void)request;
     bool alive = true;
-    for (int r = 0; r < hub->n_room; r++) alive = alive && pal_session_is_alive(hub->room[r].session);
+    for (int r = 0; r < hub->n_room; r++) alive = alive && pal_session_is_alive(hub->room[r]->session);
     reply_plain(reply, alive ? 200 : 503, alive ? "ok\n" : "a simulation has stalled\n");
 }
 
@@ -36,21 +40,22 @@ static int count_record_errors(const pal_hub *hub, int *error)
 {
     int n = 0;
     for (int r = hub->n_room - 1; r >= 0; r--) {
-        const int now = pal_session_record_error(hub->room[r].session);
+        const int now = pal_session_record_error(hub->room[r]->session);
         if (now) n++, *error = now;
     }
     return n;
 }
 
 /* assets are built before the first request; a session that is much slower than real time should get nobody more */
-static void get_ready(pal_hub *hub, pal_reply *reply)
+static void get_ready(pal_hub *hub, const pal_request *request, pal_reply *reply)
 {
+    (void)request;
     int error = 0;
     double slowdown = 0;
     char text[160] = "ready\n";
     const int n_error = count_record_errors(hub, &error);
     for (int r = 0; r < hub->n_room; r++) {
-        const pal_frame *f = hub->room[r].stream->frame;
+        const pal_frame *f = hub->room[r]->stream->frame;
         if (f && !f->paused) slowdown = fmax(slowdown, f->slowdown);
     }
     const bool bad = hub->leaving || n_error || slowdown > PAL_SLOW_MAX;
@@ -60,30 +65,101 @@ static void get_ready(pal_hub *hub, pal_reply *reply)
     reply_plain(reply, bad ? 503 : 200, hub->leaving ? "ending\n" : text);
 }
 
-static void get_sessions(pal_hub *hub, pal_reply *reply)
+/* may the bearer of the request's ticket know who is there, and open sessions? */
+static bool knows(const pal_hub *hub, const pal_request *request, const char *session, pal_wire_role role)
 {
-    cJSON *sessions = cJSON_CreateArray();
-    for (int r = 0; r < hub->n_room; r++) {
-        const pal_hub_room *room = &hub->room[r];
-        const pal_scene *scene = pal_session_scene(room->session);
-        char title[512], accuracy[512];
-        int n_free = 0;
-        for (int t = 0; t < room->members.n_tool; t++) n_free += room->members.holder[t] == 0;
-        pal_plain_text(title, sizeof title, scene->title);
-        pal_plain_text(accuracy, sizeof accuracy, scene->accuracy);
-        cJSON *session =
-            PAL_JSON({"name", JSON_TEXT(scene->name)}, {"title", JSON_TEXT(title)}, {"accuracy", JSON_TEXT(accuracy)},
-                     {"members", JSON_NUMBER(room->members.n_member)}, {"tools", JSON_NUMBER(room->members.n_tool)},
-                     {"free_tools", JSON_NUMBER(n_free)}, {"parts", JSON_NUMBER(room->stream->n_part)});
-        cJSON_AddItemToArray(sessions, session);
+    pal_grant grant;
+    return !pal_admission_check(hub->admission, request->ticket, session, request->address, (uint64_t)time(NULL),
+                                pal_loop_now_ns(hub->loop), &grant) &&
+           (hub->open || grant.has_ticket) && grant.role >= role;
+}
+
+static void add_people(cJSON *session, const pal_hub_room *room)
+{
+    cJSON *people = cJSON_AddArrayToObject(session, "people");
+    for (int i = 0; i < PAL_MEMBER_LIST_MAX; i++) {
+        const pal_member_entry *m = &room->members.member[i];
+        if (m->id)
+            cJSON_AddItemToArray(people, PAL_JSON({"name", JSON_TEXT(m->name)},
+                                                  {"role", JSON_TEXT(pal_wire_role_name((pal_wire_role)m->role))}));
     }
-    cJSON *root = PAL_JSON({"sessions", sessions});
+}
+
+static cJSON *session_json(const pal_hub_room *room)
+{
+    const pal_scene *scene = pal_session_scene(room->session);
+    const pal_frame *f = room->stream->frame;
+    char title[512], accuracy[512];
+    int n_free = 0;
+    for (int t = 0; t < room->members.n_tool; t++) n_free += room->members.holder[t] == 0;
+    pal_plain_text(title, sizeof title, scene->title);
+    pal_plain_text(accuracy, sizeof accuracy, scene->accuracy);
+    cJSON *assets = cJSON_CreateArray();
+    for (int p = 0; p < room->stream->n_part; p++)
+        cJSON_AddItemToArray(assets, JSON_TEXT(room->stream->part[p].info.asset));
+    return PAL_JSON({"name", JSON_TEXT(scene->name)}, {"title", JSON_TEXT(title)}, {"accuracy", JSON_TEXT(accuracy)},
+                    {"members", JSON_NUMBER(room->members.n_member)}, {"tools", JSON_NUMBER(room->members.n_tool)},
+                    {"free_tools", JSON_NUMBER(n_free)}, {"parts", JSON_NUMBER(room->stream->n_part)},
+                    {"state", JSON_TEXT(pal_hub_playing(room, NULL) ? "recording"
+                                        : f && f->paused            ? "paused"
+                                                                    : "running")},
+                    {"slowdown", JSON_NUMBER(f && isfinite(f->slowdown) ? f->slowdown : 1)}, {"assets", assets});
+}
+
+typedef struct openings {
+    cJSON *sessions;
+    bool with_reason;
+} openings;
+
+static void add_opening(void *user, const char *name, const char *scene, const char *why_not)
+{
+    const openings *o = user;
+    cJSON_AddItemToArray(o->sessions, PAL_JSON({"name", JSON_TEXT(name)}, {"title", JSON_TEXT(scene)},
+                                               {"state", JSON_TEXT(why_not ? "failed" : "opening")},
+                                               {"text", why_not && o->with_reason ? JSON_TEXT(why_not) : NULL}));
+}
+
+static void reply_json(pal_reply *reply, int status, cJSON *root)
+{
     char *text = cJSON_PrintUnformatted(root);
     cJSON_Delete(root);
     size_t n = text ? strlen(text) : 0;
     if (text) text[n++] = '\n'; /* the length ends it */
-    reply_text(reply, 200, "application/json", text, n);
+    reply_text(reply, status, "application/json", text, n);
     free(text);
+}
+
+static void get_sessions(pal_hub *hub, const pal_request *request, pal_reply *reply)
+{
+    cJSON *sessions = cJSON_CreateArray(), *root = PAL_JSON({"sessions", sessions});
+    for (int r = 0; r < hub->n_room; r++) {
+        cJSON *session = session_json(hub->room[r]);
+        const char *name = pal_session_scene(hub->room[r]->session)->name;
+        if (knows(hub, request, name, PAL_WIRE_ROLE_VIEWER)) add_people(session, hub->room[r]);
+        cJSON_AddItemToArray(sessions, session);
+    }
+    const bool instructs = hub->sessions && knows(hub, request, "", PAL_WIRE_ROLE_INSTRUCTOR);
+    pal_hub_sessions_openings(hub->sessions, add_opening, &(openings){sessions, instructs});
+    if (instructs) {
+        char(*name)[PAL_NAME] = calloc(PAL_SCENES_MAX, sizeof *name);
+        cJSON *scenes = cJSON_AddArrayToObject(root, "scenes");
+        const int n = name ? pal_hub_sessions_scenes(hub->sessions, name, PAL_SCENES_MAX) : 0;
+        for (int k = 0; k < n; k++) cJSON_AddItemToArray(scenes, JSON_TEXT(name[k]));
+        free(name);
+    }
+    reply_json(reply, 200, root);
+}
+
+static void post(pal_hub *hub, const pal_request *request, pal_reply *reply)
+{
+    char text[400];
+    if (strcmp(request->path, "/sessions") || !hub->sessions) {
+        reply_plain(reply, strcmp(request->path, "/sessions") ? 404 : 405,
+                    "sessions are opened and ended where the server has --scenes\n");
+        return;
+    }
+    const int status = pal_hub_sessions_post(hub->sessions, request, text, sizeof text);
+    reply_json(reply, status, PAL_JSON({status < 300 ? "session" : "error", JSON_TEXT(text)}));
 }
 
 typedef struct metric {
@@ -115,35 +191,37 @@ static size_t print_histograms(const pal_hub *hub, char *text, size_t cap)
                                 "# HELP palpate_sim_step_seconds_by_session Processor time of a step.\n"
                                 "# TYPE palpate_sim_step_seconds_by_session histogram\n");
     for (int r = 0; r < hub->n_room && n < cap; r++) {
-        const pal_stream *s = hub->room[r].stream;
+        const pal_stream *s = hub->room[r]->stream;
+        const int label = hub->room[r]->number;
         uint64_t sum = 0;
         char bound[16] = "+Inf";
         for (int k = 0; k <= PAL_STEP_BOUNDS && n < cap; k++) {
             sum += s->n_step[k];
             if (k < PAL_STEP_BOUNDS) snprintf(bound, sizeof bound, "%g", pal_step_bound_s[k]);
             n += (size_t)snprintf(text + n, cap - n,
-                                  "palpate_sim_step_seconds_by_session_bucket{session=\"%d\",le=\"%s\"} %llu\n", r,
+                                  "palpate_sim_step_seconds_by_session_bucket{session=\"%d\",le=\"%s\"} %llu\n", label,
                                   k < PAL_STEP_BOUNDS ? bound : "+Inf", (unsigned long long)sum);
         }
         if (n < cap)
             n += (size_t)snprintf(text + n, cap - n,
                                   "palpate_sim_step_seconds_by_session_sum{session=\"%d\"} %.9g\n"
                                   "palpate_sim_step_seconds_by_session_count{session=\"%d\"} %llu\n",
-                                  r, s->step_sum_s, r, (unsigned long long)sum);
+                                  label, s->step_sum_s, label, (unsigned long long)sum);
     }
     return n < cap ? n : cap;
 }
 
-static void get_metrics(pal_hub *hub, pal_reply *reply)
+static void get_metrics(pal_hub *hub, const pal_request *request, pal_reply *reply)
 {
-    static char text[32768]; /* [net] only */
+    (void)request;
+    static char text[131072]; /* [net] only */
     const pal_hub_count *n = &hub->count;
     double step_s = 0, late = 0, encode_s = 0, n_encode = 0, frame_byte = 0, delta_byte = 0;
     int role[PAL_WIRE_ROLE_COUNT] = {0};
     int record_error = 0;
     const int n_record_error = count_record_errors(hub, &record_error);
     for (int r = 0; r < hub->n_room; r++) {
-        const pal_hub_room *room = &hub->room[r];
+        const pal_hub_room *room = hub->room[r];
         const pal_stream *s = room->stream;
         for (int i = 0; i < PAL_MEMBER_LIST_MAX; i++)
             if (room->members.member[i].id) role[room->members.member[i].role]++;
@@ -202,7 +280,7 @@ static pal_packet *find_asset(const pal_hub_room *room, const char *path)
 static bool get_asset(pal_hub *hub, const char *path, pal_reply *reply)
 {
     pal_packet *asset = NULL;
-    for (int r = 0; r < hub->n_room && !asset; r++) asset = find_asset(&hub->room[r], path);
+    for (int r = 0; r < hub->n_room && !asset; r++) asset = find_asset(hub->room[r], path);
     if (!asset) return false;
     reply->status = 200;
     reply->type = "application/octet-stream";
@@ -212,21 +290,27 @@ static bool get_asset(pal_hub *hub, const char *path, pal_reply *reply)
     return true;
 }
 
-void pal_hub_get(void *user, const char *path, bool health, pal_reply *reply)
+void pal_hub_get(void *user, const pal_request *request, pal_reply *reply)
 {
     static const struct {
         const char *path;
-        void (*get)(pal_hub *hub, pal_reply *reply);
+        void (*get)(pal_hub *hub, const pal_request *request, pal_reply *reply);
         bool of_operators;
     } pages[] = {{"/healthz", get_health, true},
                  {"/readyz", get_ready, true},
                  {"/metrics", get_metrics, true},
                  {"/sessions", get_sessions, false}};
     pal_hub *hub = user;
+    const char *path = request->path;
+    const bool health = request->health;
     memset(reply, 0, sizeof *reply);
+    if (request->body && !health) {
+        post(hub, request, reply);
+        return;
+    }
     for (size_t i = 0; i < sizeof pages / sizeof *pages; i++)
         if (!strcmp(path, pages[i].path) && (pages[i].of_operators ? health || hub->health_on_main : !health)) {
-            pages[i].get(hub, reply);
+            pages[i].get(hub, request, reply);
             return;
         }
     if (health || (!get_asset(hub, path, reply) && !(hub->site && pal_site_get(hub->site, path, reply))))

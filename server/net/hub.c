@@ -12,6 +12,7 @@
 #include "server/net/hub_news.h"
 #include "server/net/hub_peers.h"
 #include "server/net/hub_plan.h"
+#include "server/net/hub_sessions.h"
 #include "server/net/hub_steering.h"
 #include "server/net/hub_verb.h"
 #include "server/net/hub_watch.h"
@@ -168,9 +169,9 @@ static pal_packet *client_next(void *user, pal_peer *peer)
 
 static pal_hub_room *find_room(pal_hub *hub, const char *session)
 {
-    if (!*session) return &hub->room[0];
+    if (!*session) return hub->n_room ? hub->room[0] : NULL;
     for (int i = 0; i < hub->n_room; i++)
-        if (!strcmp(pal_session_scene(hub->room[i].session)->name, session)) return &hub->room[i];
+        if (!strcmp(pal_session_scene(hub->room[i]->session)->name, session)) return hub->room[i];
     return NULL;
 }
 
@@ -260,7 +261,7 @@ static void hub_wake(void *user)
     pal_hub *hub = user;
     uint64_t now = pal_loop_now_ns(hub->loop), apart = (uint64_t)(0.9e9 / PAL_STREAM_RATE_HZ), due = 0;
     for (int r = 0; r < hub->n_room; r++) {
-        pal_hub_room *room = &hub->room[r];
+        pal_hub_room *room = hub->room[r];
         bool used[PAL_STREAM_TIER_COUNT];
         uint64_t next = room->stream->cycle ? room->stream->cycle_ns + apart : now;
         if (now < next) {
@@ -275,9 +276,10 @@ static void hub_wake(void *user)
         if (next && (!due || next < due)) due = next;
     }
     for (int r = 0; r < hub->n_room; r++) {
-        pal_hub_play_on(&hub->room[r]);
-        pal_hub_jobs_update(&hub->room[r]);
+        pal_hub_play_on(hub->room[r]);
+        pal_hub_jobs_update(hub->room[r]);
     }
+    pal_hub_sessions_update(hub->sessions);
     if (due) pal_loop_set_due(hub->loop, due);
 }
 
@@ -318,10 +320,10 @@ static void hub_tick(void *user)
     hub_wake(hub);
     pal_hub_hand_over_idle_tools(hub);
     for (int r = 0; r < hub->n_room; r++) {
-        pal_stream_measure(hub->room[r].stream, now);
-        pal_hub_update_subscriptions(&hub->room[r]);
-        pal_hub_count_unobserved(&hub->room[r]);
-        pal_hub_watch_pace(&hub->room[r]);
+        pal_stream_measure(hub->room[r]->stream, now);
+        pal_hub_update_subscriptions(hub->room[r]);
+        pal_hub_count_unobserved(hub->room[r]);
+        pal_hub_watch_pace(hub->room[r]);
     }
     for (int i = 0; i < hub->max_clients; i++) {
         pal_client *c = &hub->client[i];
@@ -351,7 +353,8 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
     if (!hub) return PAL_ERR_MEMORY;
     hub->loop = loop;
     hub->site = site;
-    hub->session = session;
+    hub->source = options->source;
+    hub->open = options->open;
     hub->error_m = options->error_m;
     hub->verb = options->verb ? options->verb : pal_verb_table;
     hub->n_verb = options->verb ? options->n_verb : pal_verb_count;
@@ -359,32 +362,29 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
     hub->health_on_main = !options->allow_remote && !(options->health && options->health[0]);
     hub->max_members = options->max_clients > 0 ? options->max_clients : PAL_HUB_CLIENTS;
     hub->max_clients = hub->max_members + PAL_UNJOINED_PLACES;
-    hub->room = calloc((size_t)n_session, sizeof *hub->room);
     hub->client = calloc((size_t)hub->max_clients, sizeof *hub->client);
     hub->control = malloc(sizeof *hub->control);
     hub->text = malloc(PAL_CONTROL_OUT_MAX + 1);
-    if (!hub->room || !hub->client || !hub->control || !hub->text) err = PAL_ERR_MEMORY;
+    if (!hub->client || !hub->control || !hub->text) err = PAL_ERR_MEMORY;
     if (!err) err = pal_admission_create(options->key_file, options->open, diag, &hub->admission);
+    if (!err && n_session > PAL_SESSIONS_MAX)
+        err = PAL_REFUSE(diag, "%d sessions, at most %d", n_session, PAL_SESSIONS_MAX);
     for (int i = 0; !err && i < n_session; i++) {
-        pal_hub_room *room = &hub->room[i];
-        const pal_scene *scene = pal_session_scene(session[i]);
-        room->hub = hub;
-        room->session = session[i];
-        room->step_s = scene->step_s;
-        pal_hub_accept_load(room);
-        pal_members_init(&room->members, scene->n_tool);
-        if (options->open) room->members.rights = pal_rights_named("") & ~(1u << PAL_RIGHT_COMPONENT);
-        if (options->study && options->study[i].n > 0) room->study = options->study[i];
-        if (options->recording) room->recording = options->recording[i];
-        room->passed_step = UINT64_MAX;
-        if (options->resume && options->resume[i]) {
-            pal_hub_take_edits(room->edits, options->resume[i]);
-            session[i] = NULL;
-            room->own = true;
-        }
-        err = pal_stream_open(room->session, options->error_m, diag, &room->stream);
-        if (!err) hub->n_room++;
+        const pal_opened_session opened = {.session = session[i],
+                                           .study = options->study ? options->study[i] : (pal_session_study){.n = 0},
+                                           .recording = options->recording ? options->recording[i]
+                                                                           : (pal_session_recording){.recording = NULL},
+                                           .resume = options->resume ? options->resume[i] : NULL};
+        pal_hub_room *room;
+        err = pal_hub_room_open(hub, &opened, diag, &room);
+        if (err) break;
+        room->given = &session[i];
+        /* what it borrows is the hub's now */
+        if (opened.resume) room->own = true, session[i] = NULL, room->given = NULL;
+        room->number = hub->n_numbered++;
+        hub->room[hub->n_room++] = room;
     }
+    if (!err && hub->source) err = pal_hub_sessions_create(hub, &hub->sessions);
     if (err) return pal_hub_destroy(hub), err;
     pal_loop_listen(loop, &(pal_loop_events){hub_wake, hub_tick, hub});
     *out = hub;
@@ -394,17 +394,9 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
 void pal_hub_destroy(pal_hub *hub)
 {
     if (!hub) return;
-    for (int i = 0; i < hub->n_room; i++) {
-        pal_hub_room *room = &hub->room[i];
-        pal_hub_jobs_end(room);
-        pal_stream_close(room->stream);
-        if (room->own) pal_session_close(room->session);
-        pal_packet_drop(room->members_message);
-        for (int k = 0; k < PAL_HUB_OLD_ASSETS; k++) pal_packet_drop(room->past[k].asset);
-        pal_hub_free_edits(room->edits);
-    }
+    pal_hub_sessions_destroy(hub->sessions);
+    for (int i = 0; i < hub->n_room; i++) pal_hub_room_close(hub->room[i]);
     pal_admission_destroy(hub->admission);
-    free(hub->room);
     free(hub->client);
     free(hub->control);
     free(hub->text);
@@ -437,7 +429,7 @@ void pal_hub_start_ticket(const pal_hub *hub, pal_wire_role role, char text[PAL_
 int pal_hub_record_error(const pal_hub *hub)
 {
     int error = 0;
-    for (int r = 0; r < hub->n_room && !error; r++) error = pal_session_record_error(hub->room[r].session);
+    for (int r = 0; r < hub->n_room && !error; r++) error = pal_session_record_error(hub->room[r]->session);
     return error;
 }
 

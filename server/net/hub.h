@@ -26,7 +26,8 @@ typedef struct pal_server_options {
                                    entry of it: none */
     const pal_session_study *study;         /* [n_session], borrowed until close; NULL: none */
     const pal_session_recording *recording; /* that they play [n_session], copied; NULL: none */
-    const pal_verb *verb; /* commands that clients may give [n_verb], borrowed; NULL: pal_verb_table */
+    const pal_session_source *source; /* borrowed until close; NULL: sessions are neither opened nor ended later */
+    const pal_verb *verb;             /* commands that clients may give [n_verb], borrowed; NULL: pal_verb_table */
     int n_verb;
 } pal_server_options;
 

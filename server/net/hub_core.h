@@ -10,7 +10,7 @@
 #include "server/session/recording.h"
 #include "server/session/sculpt.h"
 
-enum { PAL_HUB_QUEUE = 32, PAL_HUB_OLD_ASSETS = 8, PAL_HUB_CLIENTS = 200 };
+enum { PAL_HUB_QUEUE = 32, PAL_HUB_OLD_ASSETS = 8, PAL_HUB_CLIENTS = 200, PAL_SESSIONS_MAX = 64 };
 
 typedef struct pal_hub pal_hub;
 
@@ -26,6 +26,24 @@ typedef struct pal_session_recording {
     const pal_recording *recording; /* NULL: none */
     const char *record_path; /* of what goes on live, a name that input_log.h numbers; NULL: it is not recorded */
 } pal_session_recording;
+
+/* a session as its source has opened it */
+typedef struct pal_opened_session {
+    pal_session *session;
+    pal_session_study study;
+    pal_session_recording recording;
+    pal_resume *resume; /* whose edits are taken; NULL: none */
+    void *keep;         /* of the source: lives as long as the session; NULL: nothing */
+} pal_opened_session;
+/* opens sessions while the server runs */
+typedef struct pal_session_source {
+    void *user;
+    /* names of scenes that can be opened, at most max; NULL: none. [net] */
+    int (*list)(void *user, char (*name)[PAL_NAME], int max);
+    /* opens a scene as a session of that name; errors of loading it, with one sentence. A thread of the hub */
+    pal_err (*open)(void *user, const char *scene, const char *session, pal_diagnostic *diag, pal_opened_session *out);
+    void (*close)(void *user, void *keep); /* frees what it kept, after the session. A thread of the hub, or [load] */
+} pal_session_source;
 
 /* one connected peer; in a free entry, peer is NULL */
 typedef struct pal_client {
@@ -120,7 +138,11 @@ typedef struct pal_hub_quality {
 typedef struct pal_hub_room {
     pal_hub *hub;
     pal_session *session;
-    bool own; /* the hub created it, to replace the given session after an edit or a switch */
+    bool own;            /* the hub closes it: it was opened later, or replaces the given one after an edit or switch */
+    pal_session **given; /* where the caller has the session that it gave, and closes; NULL: it is the hub's */
+    void *keep;          /* of the source */
+    int number;          /* no other room of the hub has or had it */
+    struct pal_hub_room *next_closing;
     pal_stream *stream;
     pal_hub_old_asset past[PAL_HUB_OLD_ASSETS]; /* ring buffer, the oldest at oldest_asset */
     int oldest_asset;
@@ -170,20 +192,23 @@ typedef struct pal_verb pal_verb;
 
 struct pal_hub {
     pal_loop *loop;
-    pal_session **session; /* the caller's array [n_room] */
-    const pal_verb *verb;  /* known commands [n_verb], borrowed */
+    const pal_session_source *source; /* NULL: no sessions are opened or ended while it runs */
+    struct pal_hub_sessions *sessions;
+    bool open;            /* whoever comes is what it asks to be */
+    const pal_verb *verb; /* known commands [n_verb], borrowed */
     int n_verb;
     double error_m;
     pal_site *site;
     pal_admission *admission;
-    int n_room, max_members, max_clients, n_client; /* max_clients: members and those who have not joined yet */
+    int n_room, n_numbered, max_members, max_clients,
+        n_client; /* max_clients: members and those who have not joined yet */
     bool leaving;
-    uint32_t started_s;   /* Unix time */
-    bool health_on_main;  /* health and metrics are served beside the rest */
-    pal_hub_room *room;   /* [n_room] */
-    pal_client *client;   /* [max_clients] */
-    pal_control *control; /* scratch, too large for the stack */
-    char *text;           /* scratch [PAL_CONTROL_OUT_MAX] */
+    uint32_t started_s;                   /* Unix time */
+    bool health_on_main;                  /* health and metrics are served beside the rest */
+    pal_hub_room *room[PAL_SESSIONS_MAX]; /* [n_room] */
+    pal_client *client;                   /* [max_clients] */
+    pal_control *control;                 /* scratch, too large for the stack */
+    char *text;                           /* scratch [PAL_CONTROL_OUT_MAX] */
     pal_hub_count count;
 };
 #endif

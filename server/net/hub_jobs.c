@@ -3,9 +3,9 @@
 #include "server/net/hub_jobs.h"
 
 #include "server/base/thread.h"
+#include "server/net/hub_news.h"
 #include "server/net/hub_peers.h"
 #include "server/net/hub_plan.h"
-#include "server/net/hub_undo.h"
 #include "server/net/tuning.h"
 
 #include <math.h>
@@ -250,7 +250,8 @@ static bool commit(pal_hub_room *room, pal_job *job)
     job->type->commit(&room->edits[job->body], job, &retired);
     job->n_brush_ended = begin_brushes(room, job->type);
     keep_assets(room, retired.stream);
-    room->hub->session[room - room->hub->room] = NULL;
+    if (room->given) *room->given = NULL;
+    room->given = NULL;
     room->own = true;
     retire(room->jobs, &retired);
     return true;

@@ -42,7 +42,7 @@ static int find_idle_tool(const pal_hub_room *room, uint64_t now_ns)
 void pal_hub_hand_over_idle_tools(pal_hub *hub)
 {
     for (int r = 0; r < hub->n_room; r++) {
-        pal_hub_room *room = &hub->room[r];
+        pal_hub_room *room = hub->room[r];
         const int tool = find_idle_tool(room, pal_loop_now_ns(hub->loop));
         pal_client *next = NULL, *holder = NULL;
         for (pal_client *c = NULL; (c = pal_hub_next_member(room, c));) {

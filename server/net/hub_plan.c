@@ -2,8 +2,8 @@
  * or asleep. Commands disable components and reset single bodies (protocol/README.md, "Components and bodies"). */
 #include "server/net/hub_plan.h"
 
+#include "server/net/hub_news.h"
 #include "server/net/hub_peers.h"
-#include "server/net/hub_undo.h"
 #include "server/net/transport/plain_text.h"
 #include "server/net/tuning.h"
 

@@ -5,7 +5,6 @@
 #include "server/net/hub_news.h"
 #include "server/net/hub_peers.h"
 #include "server/net/hub_plan.h"
-#include "server/net/hub_undo.h"
 #include "server/net/hub_verb.h"
 #include "server/net/transport/plain_text.h"
 

@@ -2,9 +2,9 @@
 
 #include "server/net/hub_accuracy.h"
 #include "server/net/hub_jobs.h"
+#include "server/net/hub_news.h"
 #include "server/net/hub_rights.h"
 #include "server/net/hub_switch.h"
-#include "server/net/hub_undo.h"
 #include "server/net/tuning.h"
 
 #include <math.h>

@@ -81,4 +81,9 @@
 #define PAL_QUALITY_SPARE_NS 20000000000u
 /* rises of quality that double the time before the next: to some minutes (test_cost_hub) */
 #define PAL_QUALITY_FALLS 4
+/* scenes that wait to be opened; ns for which one that failed is listed; names of a folder that are listed
+ * (test_sessions_hub) */
+#define PAL_OPENINGS_MAX 8
+#define PAL_FAILED_NS    60000000000u
+#define PAL_SCENES_MAX   256
 #endif

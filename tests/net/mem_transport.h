@@ -111,7 +111,17 @@ static inline const pal_packet *pal_mem_receive(pal_mem_peer *peer)
 /* response to GET (assets); the caller drops the body */
 static inline void pal_mem_get(pal_transport *transport, const char *path, pal_reply *reply)
 {
-    transport->events.get(transport->events.user, path, false, reply);
+    const pal_request request = {.path = path, .ticket = "", .address = ""};
+    transport->events.get(transport->events.user, &request, reply);
+}
+
+/* the same for POST with a ticket ("": none), and for GET when body is NULL */
+static inline void pal_mem_post(pal_transport *transport, const char *path, const char *ticket, const char *body,
+                                pal_reply *reply)
+{
+    const pal_request request = {
+        .path = path, .ticket = ticket, .address = "", .body = body, .n_body = body ? strlen(body) : 0};
+    transport->events.get(transport->events.user, &request, reply);
 }
 
 /* websocket close code; 0: open */

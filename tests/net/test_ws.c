@@ -266,6 +266,79 @@ static void pages_tell_health_sessions_and_figures(void)
     CHECK(n > 0 && body[n - 1] == '\n');
 }
 
+static int list(void *user, char (*name)[PAL_NAME], int max)
+{
+    (void)user;
+    snprintf(name[0], PAL_NAME, "other.json");
+    return max > 0;
+}
+static pal_err cannot_open(void *user, const char *scene, const char *name, pal_diagnostic *diag,
+                           pal_opened_session *out)
+{
+    (void)user, (void)name, (void)out;
+    return PAL_REFUSE(diag, "%s: not there", scene);
+}
+static void keeps_nothing(void *user, void *keep)
+{
+    (void)user, (void)keep;
+}
+static const pal_session_source source = {NULL, list, cannot_open, keeps_nothing};
+
+#define JSON "Content-Type: application/json\r\n"
+
+/* a POST to /sessions with these headers and this body, in two packets when it is split; its status */
+static int post(const char *extra, const char *body, size_t split)
+{
+    char request[4096];
+    size_t at = (size_t)snprintf(request, sizeof request, "POST /sessions HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n%s\r\n",
+                                 port, extra);
+    int fd = raw_connect(port);
+    memcpy(request + at, body, strlen(body));
+    const size_t n = at + strlen(body);
+    raw_put(fd, request, split ? split : n);
+    if (split) raw_put(fd, request + split, n - split);
+    const int status = raw_head(fd, head, sizeof head);
+    close(fd);
+    return status;
+}
+
+static void sessions_are_opened_by_json_of_the_own_site(void)
+{
+    static const char body[] = "{\"open\":\"other.json\"}", bad[] = "{\"open\":\"nothing\"}";
+    static char much[2000];
+    char extra[400];
+    memset(much, ' ', sizeof much - 1);
+    snprintf(extra, sizeof extra, JSON "Content-Length: %zu\r\n", sizeof body - 1);
+    CHECK_INT(post(extra, body, 0), 202);
+    CHECK(strstr(head, "content-type: application/json") && strstr(head, "content-security-policy"));
+    snprintf(extra, sizeof extra, JSON "Content-Length: %zu\r\n", sizeof bad - 1);
+    CHECK_INT(post(extra, bad, 0), 404);
+    /* in two packets, cut anywhere */
+    for (size_t split = 1; split < 120; split += 13) CHECK_INT(post(extra, bad, split), 404);
+    /* a page of another site: its own Origin, a body that it may send unasked, or both names */
+    snprintf(extra, sizeof extra, JSON "Origin: http://evil.example\r\nContent-Length: %zu\r\n", sizeof bad - 1);
+    CHECK_INT(post(extra, bad, 0), 403);
+    snprintf(extra, sizeof extra, JSON "Origin: http://127.0.0.1:%d\r\nContent-Length: %zu\r\n", port, sizeof bad - 1);
+    CHECK_INT(post(extra, bad, 0), 404);
+    snprintf(extra, sizeof extra, "Content-Type: text/plain\r\nContent-Length: %zu\r\n", sizeof bad - 1);
+    CHECK_INT(post(extra, bad, 0), 415);
+    snprintf(extra, sizeof extra, "Content-Length: %zu\r\n", sizeof bad - 1);
+    CHECK_INT(post(extra, bad, 0), 415);
+    CHECK_INT(post(JSON, bad, 0), 411);
+    CHECK_INT(post(JSON "Content-Length: 1999\r\n", much, 0), 413);
+    CHECK_INT(post(JSON "Content-Length: 99999999999999999999\r\n", bad, 0), 413);
+    CHECK_INT(post(JSON "Content-Length: -1\r\n", bad, 0), 413);
+    CHECK_INT(post(JSON "Content-Length: 5\r\nAuthorization: Basic YTpi\r\n", "{}   ", 0), 401);
+    CHECK_INT(post(JSON "Content-Length: 5\r\nAuthorization: Bearer AAAA\r\n", "{}   ", 0), 422);
+    /* announced, and never sent: it is closed, and others are served meanwhile */
+    int fd = raw_connect(port);
+    snprintf(extra, sizeof extra,
+             "POST /sessions HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n" JSON "Content-Length: 500\r\n\r\n{", port);
+    raw_send_text(fd, extra);
+    CHECK(still_serves());
+    close(fd);
+}
+
 /* a histogram's last bucket is its count, and no bucket is smaller than the one before */
 static void steps_are_counted_by_their_time(void)
 {
@@ -596,6 +669,9 @@ int main(void)
     end();
     begin((pal_server_options){.allow_remote = true, .hosts = "organ.example,station"});
     RUN(other_machines_come_by_address_or_by_a_listed_name);
+    end();
+    begin((pal_server_options){.source = &source});
+    RUN(sessions_are_opened_by_json_of_the_own_site);
     end();
     begin((pal_server_options){.max_clients = 100, .health = "0"});
     RUN(health_answers_when_every_socket_is_held);

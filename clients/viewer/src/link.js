@@ -29,7 +29,7 @@ const FINAL = new Map([
     [1008, "access denied"],
     [1009, "the server rejected a message of this page"],
     [4001, "this page sent too many messages"],
-    [4004, "this session does not exist"],
+    [4004, "there is no such session"],
     [4005, "you cannot take part any more"],
 ]);
 

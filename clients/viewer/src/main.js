@@ -150,6 +150,7 @@ function connect() {
     post({ type: "connect", url, name: inputById("name").value.trim() || "Guest", role, ticket });
 }
 
+htmlById("lobby-link").hidden = !new URLSearchParams(location.search).has("session");
 inputById("name").value = new URLSearchParams(location.search).get("name") ?? storedName();
 inputById("name").onchange = () => {
     try {

@@ -31,6 +31,16 @@ typedef struct pal_reply {
     pal_packet *body;    /* owned by the transport; NULL: none */
 } pal_reply;
 
+/* an HTTP request */
+typedef struct pal_request {
+    const char *path;
+    bool health;         /* asked on the listener of health and metrics */
+    const char *ticket;  /* of the header Authorization: Bearer; "": none */
+    const char *address; /* IP address from which it comes; "": none */
+    const char *body;    /* of a POST, JSON [n_body]; NULL: a GET */
+    size_t n_body;
+} pal_request;
+
 /* callbacks of the hub */
 typedef struct pal_peer_events {
     /* a peer connected for a session ("": the first) with a ticket ("": none); may drop it at once */
@@ -40,9 +50,8 @@ typedef struct pal_peer_events {
     bool (*waiting)(void *user, const pal_peer *peer); /* would next return a message? */
     pal_packet *(*next)(void *user, pal_peer *peer);   /* message to send now, owned by the transport; NULL: none */
     void (*closed)(void *user, pal_peer *peer);        /* once for every opened */
-    /* GET path: fills *reply; never serves data of other members; health: asked on the listener of health and metrics
-     */
-    void (*get)(void *user, const char *path, bool health, pal_reply *reply);
+    /* a GET or POST: fills *reply; never serves data of other members */
+    void (*get)(void *user, const pal_request *request, pal_reply *reply);
     void *user;
 } pal_peer_events;
 

@@ -19,4 +19,6 @@
 #define PAL_CREDIT_WINDOW_S 0.5
 #define PAL_CREDIT_QUEUE_S  0.03
 #define PAL_CREDIT_GROWTH   1.25
+/* bytes of the body of a POST: an order of one name (test_ws) */
+#define PAL_POST_MAX 1024
 #endif

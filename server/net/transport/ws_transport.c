@@ -50,6 +50,11 @@ typedef struct request {
     size_t at;
     bool waits; /* for its turn */
     char path[512];
+    /* of a POST, whose headers are gone when its body is here */
+    bool posts;
+    char host[256], ticket[PAL_TICKET_TEXT], address[46];
+    char posted[PAL_POST_MAX];
+    size_t n_posted;
 } request;
 typedef struct connection {
     pal_peer peer; /* first: the transport's record is found from it */
@@ -154,33 +159,96 @@ static int complete(struct lws *wsi)
     return lws_http_transaction_completed(wsi) ? -1 : 0;
 }
 
-static int begin_reply(struct lws *wsi, request *r, const char *path)
+/* the ticket of a request; false: it is too long to be one */
+static bool bearer_of(struct lws *wsi, char ticket[PAL_TICKET_TEXT])
 {
-    pal_transport *t = transport_of(wsi);
-    pal_reply reply;
-    char host[256];
-    bool head = lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
-    lws_set_timer_usecs(wsi, PAL_SOCKET_DEADLINE_US);
-    if (!host_allowed(wsi, host, sizeof host)) return deny_host(wsi);
-    if (!head && lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0) return deny(wsi, 405);
-    t->events.get(t->events.user, path, listening_of(wsi)->health, &reply);
-    size_t n_body = reply.body ? reply.body->n_byte : 0;
-    bool same = reply.status == 200 && has_already(wsi, reply.etag);
-    if (same) reply.status = 304;
-    if (write_headers(wsi, &reply, host, n_body)) {
-        pal_packet_drop(reply.body);
+    char header[256];
+    ticket[0] = 0;
+    if (lws_hdr_total_length(wsi, WSI_TOKEN_HTTP_AUTHORIZATION) <= 0) return true;
+    if (lws_hdr_copy(wsi, header, sizeof header, WSI_TOKEN_HTTP_AUTHORIZATION) <= 0) return false;
+    if (strncasecmp(header, "bearer ", 7)) return false;
+    return snprintf(ticket, PAL_TICKET_TEXT, "%s", header + 7) < PAL_TICKET_TEXT;
+}
+
+static int send_reply(struct lws *wsi, request *r, pal_reply *reply, const char *host, bool head, bool same)
+{
+    size_t n_body = reply->body ? reply->body->n_byte : 0;
+    if (same) reply->status = 304;
+    if (write_headers(wsi, reply, host, n_body)) {
+        pal_packet_drop(reply->body);
         return -1;
     }
     if (same || head || n_body == 0) {
-        pal_packet_drop(reply.body);
+        pal_packet_drop(reply->body);
         return complete(wsi);
     }
-    pal_packet_replace(&r->body, reply.body);
+    pal_packet_replace(&r->body, reply->body);
     r->at = 0;
     lws_callback_on_writable(wsi);
     return 0;
 }
 
+/* The body of a POST is to follow. A page of another site cannot send one: its Origin is not this host, and JSON it may
+ * not send unasked */
+static int begin_post(struct lws *wsi, request *r, const char *path)
+{
+    char type[64] = "", length[64] = "";
+    lws_set_timer_usecs(wsi, PAL_SOCKET_DEADLINE_US);
+    if (!host_allowed(wsi, r->host, sizeof r->host)) return deny_host(wsi);
+    if (!origin_allowed(wsi, r->host)) return deny(wsi, 403);
+    (void)lws_hdr_copy(wsi, type, sizeof type, WSI_TOKEN_HTTP_CONTENT_TYPE);
+    if (strncasecmp(type, "application/json", 16)) return deny(wsi, 415);
+    if (lws_hdr_copy(wsi, length, sizeof length, WSI_TOKEN_HTTP_CONTENT_LENGTH) <= 0) return deny(wsi, 411);
+    if (strlen(length) > 8 || atol(length) < 1 || atol(length) >= PAL_POST_MAX) return deny(wsi, 413);
+    if (strlen(path) >= sizeof r->path) return deny(wsi, 414);
+    if (!bearer_of(wsi, r->ticket)) return deny(wsi, 401);
+    lws_get_peer_simple(wsi, r->address, sizeof r->address);
+    strcpy(r->path, path);
+    r->n_posted = 0;
+    r->posts = true;
+    return 0;
+}
+
+static int take_body(struct lws *wsi, request *r, const void *bytes, size_t n_byte)
+{
+    if (!r || !r->posts || n_byte >= sizeof r->posted - r->n_posted) return deny(wsi, 413);
+    memcpy(r->posted + r->n_posted, bytes, n_byte);
+    r->n_posted += n_byte;
+    return 0;
+}
+
+static int answer_post(struct lws *wsi, request *r)
+{
+    pal_transport *t = transport_of(wsi);
+    pal_reply reply;
+    if (!r || !r->posts) return -1;
+    r->posts = false;
+    r->posted[r->n_posted] = 0;
+    const pal_request asked = {.path = r->path,
+                               .health = listening_of(wsi)->health,
+                               .ticket = r->ticket,
+                               .address = r->address,
+                               .body = r->posted,
+                               .n_body = r->n_posted};
+    t->events.get(t->events.user, &asked, &reply);
+    return send_reply(wsi, r, &reply, r->host, false, false);
+}
+
+static int begin_reply(struct lws *wsi, request *r, const char *path)
+{
+    pal_transport *t = transport_of(wsi);
+    pal_reply reply;
+    char host[256], ticket[PAL_TICKET_TEXT], address[46] = "";
+    bool head = lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
+    lws_set_timer_usecs(wsi, PAL_SOCKET_DEADLINE_US);
+    if (!host_allowed(wsi, host, sizeof host)) return deny_host(wsi);
+    if (!head && lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0) return deny(wsi, 405);
+    if (!bearer_of(wsi, ticket)) return deny(wsi, 401);
+    lws_get_peer_simple(wsi, address, sizeof address);
+    const pal_request asked = {.path = path, .health = listening_of(wsi)->health, .ticket = ticket, .address = address};
+    t->events.get(t->events.user, &asked, &reply);
+    return send_reply(wsi, r, &reply, host, head, reply.status == 200 && has_already(wsi, reply.etag));
+}
 /* a request answers at once, or when its address may make another */
 static int request_came(struct lws *wsi, request *r, const char *path)
 {
@@ -188,7 +256,9 @@ static int request_came(struct lws *wsi, request *r, const char *path)
     char address[46] = "";
     lws_get_peer_simple(wsi, address, sizeof address);
     const uint64_t wait_ns = pal_request_rate_take(&t->rate, address, pal_clock_ns());
-    if (wait_ns == UINT64_MAX) return deny(wsi, 429);
+    const bool posts = lws_hdr_total_length(wsi, WSI_TOKEN_POST_URI) > 0;
+    if (wait_ns == UINT64_MAX || (posts && wait_ns > 0)) return deny(wsi, 429);
+    if (posts) return begin_post(wsi, r, path);
     if (wait_ns == 0) return begin_reply(wsi, r, path);
     if (strlen(path) >= sizeof r->path) return deny(wsi, 414);
     strcpy(r->path, path);
@@ -250,12 +320,15 @@ static int refuse_connect(struct lws *wsi)
 static int http_callback(struct lws *wsi, enum lws_callback_reasons reason, void *own, void *in, size_t n_byte)
 {
     request *r = own;
-    (void)n_byte;
     switch (reason) {
     case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
         return deny(wsi, 403); /* no subprotocol, or none we know */
     case LWS_CALLBACK_HTTP:
         return request_came(wsi, r, in);
+    case LWS_CALLBACK_HTTP_BODY:
+        return take_body(wsi, r, in, n_byte);
+    case LWS_CALLBACK_HTTP_BODY_COMPLETION:
+        return answer_post(wsi, r);
     case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:
         return confirm_upgrade(wsi);
     case LWS_CALLBACK_RAW_ADOPT:
