@@ -418,6 +418,23 @@ static pal_err copy_plan(pal_session *s)
     return PAL_ERR_OK;
 }
 
+/* the plan of the scene, of which some components are off: those can be switched on again */
+static pal_err copy_whole_plan(pal_session *s)
+{
+    const int n = s->options.resume ? s->off.n : 0;
+    int body[DISABLED_MAX];
+    for (int k = 0; k < n; k++) {
+        body[k] = pal_scene_find_body(s->scene, s->off.at[k].body);
+        if (body[k] >= 0)
+            (void)pal_world_switch_component(s->world, s->scene, body[k], s->off.at[k].component, true, NULL);
+    }
+    PAL_TRY(copy_plan(s));
+    for (int k = 0; k < n; k++)
+        if (body[k] >= 0)
+            (void)pal_world_switch_component(s->world, s->scene, body[k], s->off.at[k].component, false, NULL);
+    return PAL_ERR_OK;
+}
+
 static void take_resumed(pal_session *s, pal_resume *resume)
 {
     const char *body, *component;
@@ -440,7 +457,7 @@ static pal_err prepare(pal_session *s, pal_diagnostic *diag)
         PAL_TRY(pal_world_create(s->scene, diag, &s->world));
     if (!s->options.resume) s->predicted_ms = pal_step_cost_ms(s->scene, s->world);
     if (s->predicted_ms > 0) s->substep_ns = 1e6 * s->predicted_ms / pal_world_rest_substeps(s->world);
-    pal_err err = copy_plan(s);
+    pal_err err = copy_whole_plan(s);
     s->command = pal_command_queue_create(N_COMMAND, sizeof(pal_command));
     bool whole = !err && s->command;
     for (int k = 0; k < 3; k++) whole = (s->frame[k] = pal_frame_create(s->world)) && whole;

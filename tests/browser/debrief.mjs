@@ -105,10 +105,12 @@ await run(async () => {
         Math.abs(shown - pulled) < 0.25 * pulled,
         `${(1000 * shown).toFixed(1)} mm, pulled ${(1000 * pulled).toFixed(1)} mm`,
     );
-    const tool = await ben.evaluate(() => {
-        const label = [...document.querySelectorAll("#labels span")].find((span) => !span.hidden);
-        return label?.textContent ?? "";
-    });
+    const tool = await until(() =>
+        ben.evaluate(() => {
+            const label = [...document.querySelectorAll("#labels span")].find((span) => !span.hidden);
+            return label?.textContent ?? "";
+        }),
+    );
     check("with the recorded tool by its name", tool.length > 0 && tool !== "you", tool);
     await ada.screenshot({ path: join(pictures, "debrief_ada.png") });
     await ben.screenshot({ path: join(pictures, "debrief_ben_phone.png") });

@@ -1,7 +1,6 @@
-/* Gives an order on the bus, three times as senders do, and prints what the session says: "done TEXT" or "refused CODE
- * TEXT". With N of TRIANGLES it waits for so many tables of triangles instead, and prints the triangles of the last.
- * Ends with 1 when nothing comes within 20 s. usage: order_lcm BUS SESSION KEY_FILE|- VERB|TRIANGLES [KEY=VALUE|N]...
- */
+/* Gives an order on the bus, three times as senders do, and prints what the session reports: "done TEXT" or "refused
+ * CODE TEXT". With TRIANGLES N it waits for a table of N triangles or more instead, and prints their number. Ends with
+ * 1 when nothing comes within S seconds. usage: order_lcm S BUS SESSION KEY_FILE|- VERB|TRIANGLES [KEY=VALUE|N]... */
 #include "clients/link/lcm_link.h"
 #include "palpate_answer_t.h"
 #include "palpate_order_t.h"
@@ -23,9 +22,12 @@ static void heard(void *user, const char *channel, const void *bytes, size_t n_b
     palpate_answer_t answer;
     palpate_triangles_t triangles;
     if (n_wanted && strstr(channel, "/TRIANGLES/")) {
-        if (palpate_triangles_t_decode(bytes, 0, (int)n_byte, &triangles) < 0 || ++n_heard < n_wanted) return;
-        printf("%d\n", triangles.n_corner / 3);
+        if (palpate_triangles_t_decode(bytes, 0, (int)n_byte, &triangles) < 0) return;
+        const int n = triangles.n_corner / 3;
         palpate_triangles_t_decode_cleanup(&triangles);
+        if (n < n_wanted) return;
+        printf("%d\n", n);
+        n_heard++;
     } else if (!n_wanted && strstr(channel, "/ANSWER")) {
         if (palpate_answer_t_decode(bytes, 0, (int)n_byte, &answer) < 0) return;
         if (answer.seq != order.seq) return;
@@ -53,25 +55,25 @@ int main(int argc, char **argv)
     static double value[16];
     pal_diagnostic diag = {""};
     char channel[64];
-    if (argc < 5) return 2;
-    session = argv[2];
+    if (argc < 6) return 2;
+    session = argv[3];
     order = (palpate_order_t){
-        .seq = 1, .version = PAL_LCM_VERSION, .verb = argv[4], .target = none, .key = key, .value = value};
-    if (!strcmp(argv[4], "TRIANGLES")) n_wanted = argc > 5 ? atoi(argv[5]) : 1;
-    for (int i = 5; i < argc && !n_wanted; i++) {
+        .seq = 1, .version = PAL_LCM_VERSION, .verb = argv[5], .target = none, .key = key, .value = value};
+    if (!strcmp(argv[5], "TRIANGLES")) n_wanted = argc > 6 ? atoi(argv[6]) : 1;
+    for (int i = 6; i < argc && !n_wanted; i++) {
         char *equal = strchr(argv[i], '=');
         if (!equal) return 2;
         *equal = 0, key[order.n_arg] = argv[i], value[order.n_arg++] = atof(equal + 1);
     }
     pal_err err = pal_link_loop_create(&loop);
-    if (!err) err = pal_lcm_link_open(loop, argv[1], &events, NULL, &diag, &lcm);
-    if (!err && strcmp(argv[3], "-")) err = pal_lcm_link_use_keys(lcm, argv[3], &diag);
+    if (!err) err = pal_lcm_link_open(loop, argv[2], &events, NULL, &diag, &lcm);
+    if (!err && strcmp(argv[4], "-")) err = pal_lcm_link_use_keys(lcm, argv[4], &diag);
     pal_lcm_channel(channel, session, "ANSWER", -1);
     if (!err) err = pal_lcm_link_subscribe(lcm, channel, palpate_answer_t_get_type_info());
     if (!err) err = pal_lcm_link_subscribe(lcm, "PALPATE1/.*/TRIANGLES/.*", palpate_triangles_t_get_type_info());
     if (!err && !n_wanted && !pal_link_add_timer(loop, 200000, give, NULL)) err = PAL_ERR_MEMORY;
     if (err) fprintf(stderr, "order_lcm: %s\n", diag.text);
-    if (!err) pal_link_run_for(loop, 20);
+    if (!err) pal_link_run_for(loop, atof(argv[1]));
     pal_link_loop_destroy(loop);
     pal_lcm_link_close(lcm);
     return err || n_heard == 0;

@@ -42,21 +42,21 @@ curl -s http://127.0.0.1:8091/sessions >"$work/sessions"
 check "nobody took a tool of the second rig" "$(json free_tools "$work/sessions")" == "$(json tools "$work/sessions")"
 
 # orders
-reply=$("$order" "$bus" ball "$work/bus.keys" configure size=1)
+reply=$("$order" 60 "$bus" ball "$work/bus.keys" configure size=1)
 check "an order on the bus is answered" "$(echo "$reply" | grep -c '^done\|^refused')" == 1
-reply=$("$order" "$bus" "$sphere" "$work/bus.keys" pause)
+reply=$("$order" 60 "$bus" "$sphere" "$work/bus.keys" pause)
 check "a trainee's ticket does not pause" "$(echo "$reply" | grep -c '^refused role')" == 1
-"$order" "$bus" ball - material young_Pa=9000 >/dev/null &
+"$order" 5 "$bus" ball - material young_Pa=9000 >/dev/null &
 unsigned=$!
 wait $unsigned
 check "an order without the key is not heard" $? == 1
 
 # triangles of the surface that adapts: those of the asset, then more where it is pulled
-check "a late listener gets the present triangles" "$("$order" "$bus" "$sphere" "$work/bus.keys" TRIANGLES 1)" == 224
-PALPATE_TICKET=$(sed -n 's/.*"trainee":"\([^"]*\)".*/\1/p' "$work/second.out") timeout 60 "$bin/palpate-client" "ws://127.0.0.1:8091/ws" \
-    --json --script pull --seconds 50 --until deltas=4,triangles=230 >"$work/pull" 2>"$work/pull.err" &
+check "a late listener gets the present triangles" "$("$order" 60 "$bus" "$sphere" "$work/bus.keys" TRIANGLES 1)" == 224
+PALPATE_TICKET=$(sed -n 's/.*"trainee":"\([^"]*\)".*/\1/p' "$work/second.out") timeout 100 "$bin/palpate-client" "ws://127.0.0.1:8091/ws" \
+    --json --script pull --seconds 90 --until deltas=4,triangles=230 >"$work/pull" 2>"$work/pull.err" &
 pull=$!
-most=$("$order" "$bus" "$sphere" "$work/bus.keys" TRIANGLES 6)
+most=$("$order" 60 "$bus" "$sphere" "$work/bus.keys" TRIANGLES 225)
 check "and more of them while it is pulled" "$most" '>' 224
 wait $pull
 check "which a websocket client confirms" $? == 0

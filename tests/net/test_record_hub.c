@@ -209,6 +209,38 @@ static void what_goes_on_is_recorded(void)
     unlink(second);
 }
 
+/* a component that was off when the server ended is off, and offered to be switched on */
+static void what_is_off_can_be_switched_on_again(void)
+{
+    pal_diagnostic diag = {""};
+    pal_resume *resume = NULL;
+    mem_client a;
+    const int n_effect = clay.scene.body[0].n_effect;
+    pal_entry_init(&clay.scene.body[0].effect[clay.scene.body[0].n_effect++], "effects", "sleep");
+    begin();
+    join(&a, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, 0);
+    mem_text(&a,
+             "{\"type\":\"command\",\"verb\":\"component\",\"target\":\"sleep\",\"args\":{\"part\":0,\"enabled\":0}}");
+    const pal_wire_status *s = &a.last[PAL_CONTROL_STATUS].status;
+    WAIT_UNTIL(s->n_disabled == 1, &a, NULL);
+    mem_end(&a);
+    end();
+    REQUIRE(!pal_resume_open(path, &clay.scene, &diag, &resume) && resume);
+    served_session(pal_resume_scene(resume), (pal_session_options){.resume = resume});
+    served_open((pal_server_options){.resume = &resume});
+    join(&a, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, 0);
+    WAIT_UNTIL(a.n_text[PAL_CONTROL_STATUS] > 0, &a, NULL);
+    CHECK_INT(s->n_disabled, 1);
+    CHECK_TEXT(s->disabled[0].component, "sleep");
+    mem_text(&a,
+             "{\"type\":\"command\",\"verb\":\"component\",\"target\":\"sleep\",\"args\":{\"part\":0,\"enabled\":1}}");
+    WAIT_UNTIL(s->n_disabled == 0, &a, NULL);
+    mem_end(&a);
+    end();
+    pal_resume_free(resume);
+    clay.scene.body[0].n_effect = n_effect;
+}
+
 int main(void)
 {
     const int fd = mkstemp(path);
@@ -222,6 +254,7 @@ int main(void)
     RUN(through_edits);
     RUN(what_goes_on_is_recorded);
     RUN(goes_on_after_a_kill_at_any_moment);
+    RUN(what_is_off_can_be_switched_on_again);
     clay_free(&clay);
     unlink(path);
     return check_report();
