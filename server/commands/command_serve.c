@@ -137,7 +137,9 @@ static pal_err open_inputs(serve_run *run, const char *const *input, int n_input
         pal_log(PAL_LOG_ERROR, "session", "%s is not served: %s", input[i], bad.text);
     }
     pal_report_progress(NULL, 0, &run->common);
-    run->options.surface.progress = NULL; /* of what is opened later nobody at this terminal wants to know */
+    /* what is opened later shows no progress at this terminal, and the recording is not of it */
+    run->options.surface.progress = NULL;
+    run->options.replay = NULL;
     return PAL_ERR_OK;
 }
 

@@ -23,7 +23,7 @@
 /* between two states in the input log: s of simulated time, and ns of processor time for the steps. Who goes on after a
  * crash, or from any moment of a recording, steps so much again (test_record_hub, test_playback_hub) */
 #define PAL_STATE_S       10
-#define PAL_STATE_WORK_NS 1000000000u
+#define PAL_STATE_WORK_NS 700000000u
 /* ns between two fdatasync of the input log: what kill -9 or a power cut may cost (test_replay) */
 #define PAL_LOG_SAVE_NS 1000000000u
 /* fraction of a body's size: drift since the last snapshot above which a switch is rehearsed again

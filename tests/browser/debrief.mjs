@@ -121,7 +121,7 @@ await run(async () => {
         () => playback(ada),
         (p) => p && !p.plays,
     );
-    check("one click goes on live from there", (await text(ada)) === "live" || /slower/.test(await text(ada)));
+    check("one click goes on live from there", (await text(ada)) === "live" || /of real time/.test(await text(ada)));
     await ada.click("#pause");
     await until(
         () => ada.evaluate(() => window.palpate.state.status?.paused),

@@ -97,6 +97,22 @@ await run(async () => {
     });
     check("at phone width all controls are within the page", overflow.length === 0, overflow.join(" "));
 
+    // the canvas is blank from a change of its size until it is drawn
+    const kept = await ben.evaluate(() => {
+        const { stage } = window.palpate;
+        const { width } = stage.canvas;
+        stage.canvas.style.width = "50%";
+        stage.resize();
+        const same = stage.canvas.width === width;
+        stage.dirty = true;
+        stage.draw();
+        const drawn = stage.canvas.width < width;
+        stage.canvas.style.width = "";
+        stage.resize();
+        return { same, drawn };
+    });
+    check("a picture stays until one of the new size is drawn", kept.same && kept.drawn, JSON.stringify(kept));
+
     await ben.click("#pause");
     const paused = await until(() => ada.evaluate(() => window.palpate.state.status.paused));
     check("a pause by one member is shown to all", paused === true);

@@ -28,6 +28,10 @@ await run(async () => {
         (await text(eve, "hint")) === "You are watching. Drag to look around.",
     );
     check("and cannot pause", (await disabled(eve, "pause")) && (await disabled(eve, "reset")));
+    const offered = await eve.evaluate(() =>
+        ["modes", "pause", "step", "reset"].filter((id) => document.getElementById(id).offsetWidth > 0),
+    );
+    check("nor sees buttons of tools and of the simulation", offered.length === 0, offered.join(" "));
     check("a trainee cannot pause", await until(() => disabled(tim, "pause")));
     check("but holds a tool", (await until(() => tim.evaluate(() => window.palpate.state.ownTool + 1))) > 0);
     check("an instructor can", !(await disabled(ada, "pause")));

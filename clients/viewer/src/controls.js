@@ -93,6 +93,9 @@ export class Controls {
     showRights() {
         const { state } = this.page;
         const may = state.may("steer");
+        // who only watches has no tools to choose and nothing to control
+        const watches = state.members.get(state.ownId)?.role === "viewer";
+        for (const id of ["modes", "pause", "reset"]) htmlById(id).hidden = watches;
         const frozen = state.status?.frozen === true;
         for (const id of ["pause", "step"]) buttonById(id).disabled = !may;
         buttonById("reset").disabled = !may && !frozen;
@@ -106,7 +109,7 @@ export class Controls {
     showPaused(paused) {
         buttonById("pause").textContent = paused ? "Resume" : "Pause";
         buttonById("pause").setAttribute("aria-pressed", String(paused));
-        buttonById("step").hidden = !paused;
+        buttonById("step").hidden = !paused || this.page.state.members.get(this.page.state.ownId)?.role === "viewer";
         this.showRights();
     }
 

@@ -165,7 +165,7 @@ export class Messages {
             : message.paused
               ? "paused"
               : slow
-                ? `${message.slowdown.toFixed(1)}× slower than real time`
+                ? `${(1 / message.slowdown).toFixed(2)} of real time`
                 : "live";
         layout.connection(message.frozen ? "lost" : "live", text);
         this.showFigures();

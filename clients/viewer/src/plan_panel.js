@@ -122,7 +122,10 @@ export class PlanPanel {
     showStatus(status, figures, parts) {
         const { paused, slowdown } = status;
         this.figure("steps per second", paused ? "paused" : status.step_rate_hz.toFixed(0));
-        this.figure("speed", paused ? "–" : slowdown <= 1.02 ? "real time" : slowdown.toFixed(2) + " × slower");
+        this.figure(
+            "speed",
+            paused ? "–" : slowdown <= 1.02 ? "real time" : `${(1 / slowdown).toFixed(2)} of real time`,
+        );
         this.figure("time per step", status.step_ms.toFixed(2) + " ms");
         this.figure("sub-steps", String(status.substeps));
         this.figure("round trip", figures.rtt_ms > 0 ? figures.rtt_ms.toFixed(1) + " ms" : "–");

@@ -83,6 +83,7 @@ export class Stage {
         this.dirty = true;
         const ratio = Math.min(window.devicePixelRatio || 1, 2);
         this.pace = new Pace(RATIO_MIN / ratio, software ? 0.6 / ratio : 1);
+        this.sizeDue = true; // the canvas has not the size of its element yet
         new ResizeObserver(() => this.resize()).observe(canvas);
         // moving to a screen with another pixel ratio keeps the size
         window.addEventListener("resize", () => this.resize());
@@ -124,8 +125,7 @@ export class Stage {
     resize() {
         const width = this.canvas.clientWidth || 1;
         const height = this.canvas.clientHeight || 1;
-        this.renderer.setPixelRatio(this.pixelRatio());
-        this.renderer.setSize(width, height, false);
+        this.sizeDue = true;
         const before = this.homeDistance();
         this.camera.aspect = width / height;
         this.distance *= this.homeDistance() / before;
@@ -230,10 +230,19 @@ export class Stage {
         return this.pace.ready(performance.now());
     }
 
+    /** a canvas that gets another size is blank until it is drawn, so both happen in one turn */
+    applySize() {
+        if (!this.sizeDue) return;
+        this.sizeDue = false;
+        this.renderer.setPixelRatio(this.pixelRatio());
+        this.renderer.setSize(this.canvas.clientWidth || 1, this.canvas.clientHeight || 1, false);
+    }
+
     /** draws when something changed */
     draw() {
         if (!this.dirty) return;
         this.dirty = false;
+        this.applySize();
         this.placeCamera();
         this.pace.begin(performance.now());
         this.renderer.render(this.scene, this.camera);
