@@ -99,6 +99,7 @@ typedef struct pal_wire_topology {
 typedef struct pal_wire_tool_info {
     char name[PAL_WIRE_NAME_BYTES]; /* e.g. "probe" */
     double radius_m;
+    double force_cap_N; /* largest force that it exerts and feels; 0: unknown, and not on the wire */
 } pal_wire_tool_info;
 /* what happened in a recording that the session plays */
 typedef struct pal_wire_mark {

@@ -19,8 +19,10 @@ static const pal_control_field part_fields[] = {{"name", TEXT, true, ONE(part_in
                                                 {"adaptive", BOOL, false, ONE(part_info, is_adaptive)},
                                                 {"sculptable", BOOL, false, ONE(part_info, is_sculptable)},
                                                 {0}};
-static const pal_control_field tool_fields[] = {
-    {"name", TEXT, true, ONE(tool_info, name)}, {"radius_m", F64, true, ONE(tool_info, radius_m)}, {0}};
+static const pal_control_field tool_fields[] = {{"name", TEXT, true, ONE(tool_info, name)},
+                                                {"radius_m", F64, true, ONE(tool_info, radius_m)},
+                                                {"force_cap_N", F64, false, ONE(tool_info, force_cap_N)},
+                                                {0}};
 static const pal_control_field mark_fields[] = {
     {"time_s", F64, true, ONE(mark, time_s)}, {"text", TEXT, true, ONE(mark, text)}, {0}};
 static const pal_control_field you_fields[] = {{"id", U16, true, ONE(hello, you_id)},

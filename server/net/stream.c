@@ -489,6 +489,7 @@ void pal_stream_hello(const pal_stream *stream, pal_wire_hello *out)
     for (int t = 0; t < scene->n_tool; t++) {
         pal_plain_text(out->tool[t].name, sizeof out->tool[t].name, scene->tool[t].name);
         /* the world's radius when a frame gives it, else the default of pal_tool_def */
+        out->tool[t].force_cap_N = scene->tool[t].force_cap_N;
         out->tool[t].radius_m = stream->frame && t < stream->frame->n_tool ? stream->frame->tool[t].radius_m
                                 : scene->tool[t].radius_m > 0              ? scene->tool[t].radius_m
                                                                            : 0.04 * sqrt(size);

@@ -72,6 +72,7 @@ static void newcomer_gets_hello_members_frame_and_tools_in_this_order(void)
     CHECK(hello->you_id > 0 && hello->you_tool == 0 && hello->n_tool == 2 && hello->n_part == 1 &&
           hello->plan.n_component > 0);
     CHECK(hello->box_max_m[0] > hello->box_min_m[0] && hello->tool[0].radius_m > 0 && hello->credit >= 2);
+    CHECK_NEAR(hello->tool[0].force_cap_N, organ.scene.tool[0].force_cap_N, 0);
     pal_server_advance(server);
     CHECK_INT(mem_pull(&ada, 1), 1);
     CHECK_INT(ada.n_text[PAL_CONTROL_MEMBERS], 1);

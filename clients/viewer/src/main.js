@@ -8,6 +8,7 @@ import { Controls } from "./controls.js";
 import { byId, htmlById, inputById } from "./dom.js";
 import { WRITERS } from "./exporters.js";
 import { FieldDisplay } from "./field_display.js";
+import { forceText } from "./force_text.js";
 import { Layout } from "./layout.js";
 import { MembersPanel } from "./members_panel.js";
 import { Messages } from "./messages.js";
@@ -92,7 +93,7 @@ function showForce() {
     const tool = state.ownToolState();
     const force = tool && !tool.away ? Math.hypot(...tool.force) : 0;
     htmlById("force").hidden = !(state.target || force > FORCE_MIN_N);
-    htmlById("force-value").textContent = force.toFixed(2);
+    htmlById("force-value").textContent = forceText(force, state.hello?.tools[state.ownTool]?.force_cap_N);
 }
 
 let nDrawn = 0;

@@ -3,6 +3,7 @@ import { cssColour } from "./plan_panel.js";
 import * as THREE from "./three.js";
 
 const SAME_N = 0.005; // forces that differ by less have the same arrow
+const GHOST_OPACITY = 0.25;
 const ARROW_MIN_N = 0.02; // smallest force with an arrow
 
 /** @typedef {import("./wire.js").Tool} Tool */
@@ -29,7 +30,7 @@ export class ToolMarks {
     constructor(stage, labels) {
         this.stage = stage;
         this.labels = labels;
-        /** @type {{ball: THREE.Mesh, arrow: THREE.ArrowHelper, label: HTMLSpanElement, at: THREE.Vector3, shown: boolean}[]} */
+        /** @type {{ball: THREE.Mesh, ghost: THREE.Mesh, arrow: THREE.ArrowHelper, label: HTMLSpanElement, at: THREE.Vector3, shown: boolean}[]} */
         this.marks = [];
         /** @type {Tool[]} as last drawn */
         this.drawn = [];
@@ -47,6 +48,18 @@ export class ToolMarks {
                     clearcoatRoughness: 0.1,
                 }),
             );
+            // where tissue hides the tool, it shines through
+            const ghost = new THREE.Mesh(
+                ball.geometry,
+                new THREE.MeshBasicMaterial({
+                    transparent: true,
+                    opacity: GHOST_OPACITY,
+                    depthTest: false,
+                    depthWrite: false,
+                }),
+            );
+            ghost.renderOrder = 1;
+            ball.add(ghost);
             const arrow = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 0.01, 0xffffff);
             const label = document.createElement("span");
             // the force mostly points into the tissue: its arrow is drawn over it
@@ -57,7 +70,7 @@ export class ToolMarks {
             ball.visible = arrow.visible = label.hidden = false;
             this.stage.scene.add(ball, arrow);
             this.labels.append(label);
-            this.marks.push({ ball, arrow, label, at: new THREE.Vector3(), shown: false });
+            this.marks.push({ ball, ghost, arrow, label, at: new THREE.Vector3(), shown: false });
         }
         return this.marks[index];
     }
@@ -78,6 +91,7 @@ export class ToolMarks {
             mark.ball.position.copy(mark.at);
             mark.ball.scale.setScalar(Math.max(tool.radius, radiusLimit));
             /** @type {THREE.MeshPhysicalMaterial} */ (mark.ball.material).color.setHex(tool.colour);
+            /** @type {THREE.MeshBasicMaterial} */ (mark.ghost.material).color.setHex(tool.colour);
             if (mark.arrow.visible) {
                 mark.arrow.position.copy(mark.at);
                 mark.arrow.setDirection(new THREE.Vector3().fromArray(tool.force).normalize());
