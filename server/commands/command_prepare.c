@@ -9,6 +9,7 @@
 #include "server/commands/tuning.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/mesh/scan/label_volume.h"
+#include "server/scene/scene_arg.h"
 #include "server/scene/scene_file.h"
 #include "server/sim/world/world.h"
 #include "server/solve/preflight.h"
@@ -24,7 +25,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { PATH = 1200, TETGEN_MAX = 1000000, LABELS = 256, FILES = 64 };
+enum { PATH = 1200, TETGEN_MAX = 1000000, LABELS = 256, FILES = 64, SENTENCE = 160 };
 
 static const char about[] =
     "Makes a scene from a surface (OBJ, STL, PLY, OFF) or a segmented scan (NIfTI .nii .nii.gz, INRIMAGE .inr\n"
@@ -54,9 +55,10 @@ typedef struct outcome {
     size_t world_byte;
     double limit_s;
     int n_substep,
-        fine_substep; /* of a step at rest; with a face of the finest level, as each level halves the bound */
-    int max_node;     /* limit of the component refine; 0: none is needed                                  */
-    double busy;      /* predicted share of real time with as many nodes as the limit allows               */
+        fine_substep;    /* of a step at rest; with a face of the finest level, as each level halves the bound */
+    int max_node;        /* limit of the component refine; 0: none is needed                                  */
+    double busy;         /* predicted share of real time with as many nodes as the limit allows               */
+    char size[SENTENCE]; /* a question about the unit; "": the size is an organ's */
     char slow[PAL_PREFLIGHT_LINE]; /* the body returns slowly; "": it does not, or its world takes long */
     char file[FILES][80];
     int n_file;
@@ -115,6 +117,21 @@ static int remove_one(const char *path, const struct stat *facts, int kind, stru
     return remove(path);
 }
 
+/* is what was written a scene that serve takes? */
+static pal_err read_back(const char *stage, pal_diagnostic *diag)
+{
+    char path[PATH + 20];
+    pal_loaded_scene *again = NULL;
+    snprintf(path, sizeof path, "%s/scene.json", stage);
+    pal_err err = pal_scene_arg(path, NULL, &again, NULL, NULL, diag);
+    pal_scene_free(again);
+    /* its path is gone when somebody reads the sentence */
+    const size_t n = strlen(path);
+    if (err && !strncmp(diag->text, path, n) && !strncmp(diag->text + n, ": ", 2))
+        memmove(diag->text, diag->text + n + 2, strlen(diag->text + n + 2) + 1);
+    return err;
+}
+
 static pal_err save(const pal_loaded_scene *loaded, const arguments *args, outcome *out, pal_diagnostic *diag)
 {
     char stage[PATH], stem[PATH + 100];
@@ -133,6 +150,7 @@ static pal_err save(const pal_loaded_scene *loaded, const arguments *args, outco
     sigprocmask(SIG_BLOCK, &asked, &old);
     pal_err err = pal_scene_make_folder(args->folder, diag);
     if (!err) err = pal_scene_save(loaded, stage, diag);
+    if (!err) err = read_back(stage, diag);
     if (!err && tetgen) err = pal_mesh_file_write_tetgen(stem, &loaded->mesh[0].tets, diag);
     if (!err) err = move_up(stage, args->folder, out, diag);
     nftw(stage, remove_one, 4, FTW_DEPTH | FTW_PHYS);
@@ -190,7 +208,8 @@ static cJSON *as_json(const pal_loaded_scene *loaded, const arguments *args, con
         {"units", PAL_JSON({"name", JSON_TEXT(args->units ? args->units : r->unit_name)}, {"m", JSON_NUMBER(r->unit_m)},
                            {"guessed", JSON_BOOL(r->unit_guessed)})},
         {"label", r->label >= 0 ? JSON_NUMBER(r->label) : NULL}, {"triangles", JSON_NUMBER(mesh->surface.n_tri)},
-        {"vertices", JSON_NUMBER(mesh->surface.n_vertex)});
+        {"vertices", JSON_NUMBER(mesh->surface.n_vertex)},
+        {"size_question", out->size[0] ? JSON_TEXT(out->size) : NULL});
     if (r->n_level > 0)
         add_levels(o, out);
     else
@@ -286,6 +305,11 @@ static void print(const pal_loaded_scene *loaded, const arguments *args, const o
     pal_loose_components_describe(&loaded->loose[0], loaded->scene.body[0].name, &dropped);
     if (dropped.text[0]) printf("%s\n", dropped.text);
     if (out->slow[0]) printf("%s\n", out->slow);
+    if (out->size[0]) printf("%s\n", out->size);
+    if (r->n_level == 0 && fabs(r->prepare.volume_error) > PAL_VOLUME_MISSED)
+        printf("the voxels miss the volume of the surface by %.0f %%: a larger --resolution comes nearer, and --model "
+               "adaptive keeps the surface itself\n",
+               100 * fabs(r->prepare.volume_error));
     if (d->n_degenerate + d->n_duplicate + d->n_nonfinite + d->n_folded > 0)
         printf("dropped triangles: %lld degenerate, %lld duplicate, %lld not finite, %lld folded\n",
                (long long)d->n_degenerate, (long long)d->n_duplicate, (long long)d->n_nonfinite,
@@ -323,17 +347,36 @@ static pal_err limit_nodes(pal_loaded_scene *loaded, const char *name, outcome *
 }
 
 /* what a user should know before serving: that the body returns slowly. Left out for a body whose world takes long */
-static pal_err find_return(const pal_loaded_scene *loaded, outcome *out)
+static pal_err find_return(const pal_loaded_scene *loaded, outcome *out, pal_diagnostic *diag)
 {
     pal_world *world;
     if (loaded->scene.body[0].mesh->tets.n_node > PAL_RETURN_NODES) return PAL_ERR_OK;
-    /* what serve would refuse is refused there */
-    if (pal_world_create(&loaded->scene, NULL, &world)) return PAL_ERR_OK;
+    PAL_TRY(pal_world_create(&loaded->scene, diag, &world));
     pal_err err = PAL_ERR_OK;
     if (!(pal_world_body(world, 0)->lowest_1_s > 0)) err = pal_world_find_lowest(world, 0, NULL);
     (void)pal_preflight_slow(pal_world_body(world, 0), out->slow);
     pal_world_destroy(world);
     return err;
+}
+
+/* no organ is so small or so large: a unit of the file is wrong. Names the one that gives the usual size */
+static void question_size(const pal_loaded_scene *loaded, double unit_m, char text[SENTENCE])
+{
+    static const char *const unit[] = {"mm", "cm", "in", "um", "m"};
+    double low[3], high[3], size_m = 0;
+    const char *likely = NULL;
+    text[0] = 0;
+    pal_surface_box(&loaded->mesh[0].surface, low, high);
+    for (int k = 0; k < 3; k++) size_m = fmax(size_m, high[k] - low[k]);
+    if (size_m >= PAL_ORGAN_MIN_M && size_m <= PAL_ORGAN_MAX_M) return;
+    for (size_t k = 0; k < sizeof unit / sizeof *unit && !likely; k++) {
+        const double other_m = unit_m > 0 ? size_m / unit_m * pal_mesh_unit_named(unit[k]) : 0;
+        if (other_m >= PAL_ORGAN_MIN_M && other_m <= PAL_ORGAN_MAX_M) likely = unit[k];
+    }
+    if (likely)
+        snprintf(text, SENTENCE, "the body is %.3g m long: is the file in %s? (--units %s)", size_m, likely, likely);
+    else
+        snprintf(text, SENTENCE, "the body is %.3g m long: is its unit right? (--units)", size_m);
 }
 
 static int run(pal_flag_common *common, const char *in, arguments *args)
@@ -347,12 +390,15 @@ static int run(pal_flag_common *common, const char *in, arguments *args)
     pal_err err = !in ? pal_scene_procedural(&args->scene, &loaded, &out.report, &diag)
                       : pal_scene_from_surface(in, &args->scene, &loaded, &out.report, &diag);
     if (err) return pal_report_refusal(common, err, &diag);
+    question_size(loaded, out.report.unit_m, out.size);
     err = pal_scene_rename(loaded, args->name, args->title, args->source, &diag);
     if (!err && args->scene.adaptive) err = limit_nodes(loaded, in ? in : "procedural", &out, &diag);
-    if (!err) err = find_return(loaded, &out);
+    if (!err) err = pal_diagnostic_prefix(&diag, find_return(loaded, &out, &diag), in ? in : "procedural");
     double before = pal_clock_s();
     pal_report_progress("write", 0, common);
-    if (!err) err = save(loaded, args, &out, &diag);
+    if (!err) err = pal_diagnostic_prefix(&diag, save(loaded, args, &out, &diag), in ? in : "procedural");
+    if (err && out.size[0])
+        snprintf(diag.text + strlen(diag.text), sizeof diag.text - strlen(diag.text), "; %s", out.size);
     out.write_s = pal_clock_s() - before;
     out.total_s = pal_clock_s() - start;
     int code = pal_report_end(common, err, &diag, err || !common->json ? NULL : as_json(loaded, args, &out));

@@ -92,6 +92,15 @@ static double in_mm(double metres)
     return mm;
 }
 
+/* a number that acts on nothing would mislead who reads the file */
+static bool gravity_acts(const pal_scene *scene)
+{
+    for (int b = 0; b < scene->n_body; b++)
+        for (int e = 0; e < scene->body[b].n_effect; e++)
+            if (!strcmp(scene->body[b].effect[e].name, "gravity")) return true;
+    return false;
+}
+
 /* the scene as text, or NULL; the caller frees it */
 static char *scene_text(const pal_scene *scene)
 {
@@ -110,7 +119,7 @@ static char *scene_text(const pal_scene *scene)
     cJSON *root = PAL_JSON({"name", JSON_TEXT(scene->name)}, {"title", JSON_TEXT(scene->title)},
                            {"source", JSON_TEXT(scene->source)}, {"accuracy", accuracy}, {"budget", budget},
                            {"step_s", pal_json_exact(scene->step_s)}, {"up", pal_json_exact_list(scene->up, 3)},
-                           {"gravity_m_s2", pal_json_exact(scene->gravity_m_s2)},
+                           {"gravity_m_s2", gravity_acts(scene) ? pal_json_exact(scene->gravity_m_s2) : NULL},
                            {"max_substep", pal_json_exact(scene->max_substep)}, {"bodies", bodies}, {"tools", tools});
     if (scene->keep_real_time) cJSON_AddTrueToObject(root, "keep_real_time");
     char *text = cJSON_Print(root);

@@ -120,6 +120,29 @@ run prepare huge.obj -o scene5 --no-tetgen --units m
 refused 1 "huge.obj: line 9: tools"
 end
 
+begin "prepare questions a size that no organ has, and refuses what serve would refuse"
+run prepare box.obj -o size --no-tetgen --units m
+refused 1 "box.obj: tools\[0\].radius_m: .* is outside 0 .. 1; the body is 100 m long: is the file in mm? (--units mm)"
+run prepare box.obj -o size --no-tetgen --units um
+refused 1 "box.obj: a step of .* sub-steps.*; the body is 0.0001 m long: is the file in mm? (--units mm)"
+check "a folder is left" test ! -e size
+scaled_by 26 >tall.obj
+run prepare tall.obj -o size --no-tetgen --units mm
+check "exit code $code" code_is 0
+check "2.6 m is not questioned" has out "the body is 2.6 m long: is its unit right?"
+run prepare box.obj -o size --no-tetgen --units mm
+check "100 mm are questioned" test "$(grep -c 'is the file in' out)" -eq 0
+check "gravity is written where it does not act" test "$(grep -c gravity_m_s2 size/scene.json)" -eq 0
+end
+
+begin "prepare says when voxels miss the volume of a thin body"
+awk '$1 == "v" { $4 *= 0.2 } { print }' box.obj >thin.obj
+run prepare thin.obj -o thin --no-tetgen --units mm --resolution 10
+check "the volume is not questioned" has out "the voxels miss the volume of the surface by .* %: a larger --resolution"
+run prepare box.obj -o thin --no-tetgen --units mm --resolution 20
+check "that of a block is" test "$(grep -c 'miss the volume' out)" -eq 0
+end
+
 begin "--quiet prints nothing"
 run prepare box.obj -o scene3 --quiet
 check "exit code $code" code_is 0
