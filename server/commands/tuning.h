@@ -24,8 +24,8 @@
 /* ns: least time between two starts of a palpate-lcm that ends; time for it to end after SIGTERM */
 #define PAL_LCM_RESTART_NS 1000000000u
 #define PAL_LCM_LEAVE_NS   1000000000u
-/* m: sizes between which `palpate prepare` takes a body for one that a hand works on, from a lymph node to a torso; share
- * of the volume that voxels may miss (tests/house/test_commands.sh) */
+/* m: sizes between which `palpate prepare` takes a body for one that a hand works on, from a lymph node to a torso;
+ * share of the volume that voxels may miss (tests/house/test_commands.sh) */
 #define PAL_ORGAN_MIN_M   0.005
 #define PAL_ORGAN_MAX_M   1.5
 #define PAL_VOLUME_MISSED 0.05

@@ -55,6 +55,11 @@ await run(async () => {
         (list) => list.includes("pause"),
     );
     check("all see who paused", /^Tim\s*pause/.test(orders), orders);
+    const state = await until(
+        () => text(eve, "state-text"),
+        (now) => now.startsWith("paused"),
+    );
+    check("in the state of the simulation too", state === "paused by Tim", state);
     await ada.evaluate(() => document.getElementById("orders").scrollIntoView());
     await ada.screenshot({ path: `${pictures}/rights_instructor.png` });
     await eve.screenshot({ path: `${pictures}/rights_viewer.png` });

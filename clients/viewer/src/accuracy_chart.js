@@ -34,7 +34,11 @@ function drawAxes(plot) {
             shape("text", { x: left - 5, y: at + 3.5, class: "tick", "text-anchor": "end" }, text),
         ]),
         shape("text", { x: right, y: bottom + 28, class: "tick", "text-anchor": "end" }, "ms per step"),
-        shape("text", { x: 2, y: top - 9, class: "tick" }, "largest error, mm"),
+        shape(
+            "text",
+            { x: 2, y: top - 9, class: "tick" },
+            plot.studied ? "largest error under the study's loads, mm" : "largest error now, mm",
+        ),
     ];
 }
 
@@ -46,11 +50,21 @@ function drawLimits(plot, { stepMs, reference }) {
         const x = plot.x(stepMs);
         const text = `${milliseconds(stepMs)} per step is real time: configurations to the right are slower`;
         out.push(shape("line", { x1: x, x2: x, y1: top, y2: bottom, class: "limit" }, text));
+        // beside the line, where there is room
+        const isLeft = x < (left + right) / 2;
+        const at = {
+            x: x + (isLeft ? 3 : -3),
+            y: bottom - 4,
+            class: "limit-name",
+            "text-anchor": isLeft ? "start" : "end",
+        };
+        out.push(shape("text", at, "real time"));
     }
     if (reference !== undefined && 1e3 * reference > plot.errorRange.low && 1e3 * reference < plot.errorRange.high) {
         const y = plot.y(reference);
         const text = `${millimetres(reference)} is the error of the reference: smaller errors cannot be distinguished`;
         out.push(shape("line", { x1: left, x2: right, y1: y, y2: y, class: "limit" }, text));
+        out.push(shape("text", { x: left + 3, y: y - 3, class: "limit-name" }, "error of the reference"));
     }
     return out;
 }

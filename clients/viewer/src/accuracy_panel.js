@@ -202,6 +202,8 @@ export class AccuracyPanel {
         this.at("ms").textContent = estimate ? milliseconds(estimate.cost_ms) : "–";
         this.at("error").textContent = text.error;
         this.at("age").textContent = text.age;
+        this.at("error").classList.toggle("old", text.age !== "");
+        this.at("bar").classList.toggle("old", text.age !== "");
         this.at("note").textContent = text.note;
         this.at("parts").replaceChildren(...parts.map((p) => this.legendItem(p.colour, p.title, millimetres(p.value))));
         const segments = parts.filter((part) => part.share > SHARE_MIN);

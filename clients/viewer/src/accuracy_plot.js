@@ -1,6 +1,6 @@
 // The plot of error against cost: milliseconds per step and the largest error, both axes logarithmic. Pure: numbers in,
 // positions out; accuracy_chart.js draws them.
-import { positive, short } from "./accuracy_text.js";
+import { positive, RESOLUTION_M, short } from "./accuracy_text.js";
 
 /**
  * @typedef {import("./control_table.js").Estimate} Estimate
@@ -9,7 +9,7 @@ import { positive, short } from "./accuracy_text.js";
  * @typedef {ReturnType<typeof layOutPlot>} Plot
  */
 
-/** smaller errors are drawn here: those of a body at rest are rounding errors */
+/** smaller errors are drawn here: they are rounding errors */
 const ERROR_MIN_M = 1e-8;
 
 /** colours of the methods in the order of the study, distinguishable on dark ground with any colour vision */
@@ -85,24 +85,36 @@ export function positionOn(front, estimate) {
 }
 
 /**
+ * The errors that the plot shows: those under the study's loads, which are of one kind; the estimate is of the present
+ * load and has no place among them. The running configuration has that of its own point, and a neighbour as many times
+ * that as it is predicted to have of the present error. Without a study all are errors under the present load.
+ * @param {StudyPoint[]} good @param {Estimate | null} estimate
+ * @returns {{studied: boolean, live: number | undefined, of: (error_m: number | undefined) => number | undefined}}
+ */
+function errorsOf(good, estimate) {
+    if (good.length === 0) return { studied: false, live: estimate?.error_m, of: (error_m) => error_m };
+    const live = good.find((p) => p.index === estimate?.study_point)?.error_m;
+    const now = estimate?.error_m;
+    const scale = live !== undefined && positive(now) && now >= RESOLUTION_M ? live / now : undefined;
+    return { studied: true, live, of: (error_m) => (scale && positive(error_m) ? scale * error_m : undefined) };
+}
+
+/**
  * The contents of the plot, in the coordinates of its drawing.
  * @param {StudyPoint[]} points @param {Estimate | null} estimate @param {{left: number, right: number, top: number, bottom: number}} box
  */
 export function layOutPlot(points, estimate, box) {
     const good = points.filter((p) => positive(p.cost_ms) && positive(p.error_m));
-    const near = estimate?.neighbours ?? [];
-    const both = (/** @type {{cost_ms?: number, error_m?: number} | null} */ p) =>
-        p !== null && positive(p.cost_ms) && positive(p.error_m);
-    const shown = [...good, ...near.filter(both), ...(both(estimate) ? [estimate] : [])];
-    const msRange = logRange([
-        ...shown.map((p) => /** @type {number} */ (p?.cost_ms)),
-        ...(positive(estimate?.cost_ms) ? [estimate.cost_ms] : []),
-    ]);
-    // the error of a body at rest is far below the studied ones: it is drawn at the foot of the plot
-    const min = Math.max(ERROR_MIN_M, ...(good.length ? [0.1 * Math.min(...good.map((p) => p.error_m))] : []));
-    const errorRange = logRange(shown.map((p) => 1e3 * Math.max(min, /** @type {number} */ (p?.error_m))));
+    const errors = errorsOf(good, estimate);
+    const near = (estimate?.neighbours ?? []).flatMap((of) => {
+        const error_m = errors.of(of.error_m);
+        return positive(of.cost_ms) && positive(error_m) ? [{ of, cost_ms: of.cost_ms, error_m }] : [];
+    });
+    const msRange = logRange([...good, ...near, estimate].flatMap((p) => (positive(p?.cost_ms) ? [p.cost_ms] : [])));
+    const shown = [...good, ...near].map((p) => p.error_m).concat(positive(errors.live) ? [errors.live] : []);
+    const errorRange = logRange(shown.map((m) => 1e3 * Math.max(ERROR_MIN_M, m)));
     const x = (/** @type {number} */ ms) => logPosition(ms, msRange, box.left, box.right);
-    const y = (/** @type {number} */ m) => logPosition(1e3 * Math.max(min, m), errorRange, box.bottom, box.top);
+    const y = (/** @type {number} */ m) => logPosition(1e3 * Math.max(ERROR_MIN_M, m), errorRange, box.bottom, box.top);
     const methods = [...new Set(good.map((p) => p.method))];
     return {
         methods: methods.map((name, i) => ({ name, colour: METHOD_COLOURS[i % METHOD_COLOURS.length] })),
@@ -118,12 +130,11 @@ export function layOutPlot(points, estimate, box) {
             colour: METHOD_COLOURS[methods.indexOf(p.method) % METHOD_COLOURS.length],
         })),
         front: frontOf(good).map((p) => ({ x: x(p.cost_ms), y: y(p.error_m) })),
-        neighbours: near.flatMap((n) =>
-            positive(n.cost_ms) && positive(n.error_m) ? [{ x: x(n.cost_ms), y: y(n.error_m), of: n }] : [],
-        ),
-        // without an error estimate the body is a vertical line at its cost
+        neighbours: near.map(({ of, cost_ms, error_m }) => ({ x: x(cost_ms), y: y(error_m), of })),
+        studied: errors.studied,
+        // a configuration of unknown error is a vertical line at its cost
         live: positive(estimate?.cost_ms)
-            ? { x: x(estimate.cost_ms), y: positive(estimate.error_m) ? y(estimate.error_m) : null }
+            ? { x: x(estimate.cost_ms), y: positive(errors.live) ? y(errors.live) : null }
             : null,
         x,
         y,

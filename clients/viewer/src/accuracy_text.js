@@ -9,6 +9,7 @@
 /** smallest length that is displayed, m: shorter ones are "< 0.001 mm" */
 export const RESOLUTION_M = 1e-6;
 const OLD_S = 1; // an older estimate is displayed with its age; a switch does not use it either
+const REST_M = 1e-5; // a body that moves less is at rest
 const SAME_MS = 0.005; // half the last digit of a displayed time
 
 /** parts of the error, in the order of the stacked bar */
@@ -46,7 +47,7 @@ export function millimetres(m) {
 /** a label of the server without underscores @param {string} label */
 export const plainLabel = (label) => label.replaceAll("_", " ");
 
-const percent = (/** @type {number} */ value) => `${value.toPrecision(2)} %`;
+const percent = (/** @type {number} */ value) => `${value < 99.5 ? value.toPrecision(2) : Math.round(value)} %`;
 
 /** a point of the study: cost, error, and the error of the force where it was judged @param {StudyPoint} point */
 export const pointText = (point) =>
@@ -62,9 +63,21 @@ export const milliseconds = (ms) => (ms === undefined ? "unknown" : `${short(ms)
  */
 export function errorText(estimate) {
     if (!estimate) return { error: "being estimated", age: "", note: "", known: false };
-    const { age_s = 0, error_m, locking, diagnostic = "", tick, energy_error_percent, force_percent } = estimate;
+    const {
+        age_s = 0,
+        error_m,
+        max_displacement_m,
+        locking,
+        diagnostic = "",
+        tick,
+        energy_error_percent,
+        force_percent,
+    } = estimate;
     if (tick === 0)
         return { error: diagnostic ? "not estimated" : "being estimated", age: "", note: diagnostic, known: false };
+    // rounding errors of a body that nothing moves say nothing
+    if (max_displacement_m !== undefined && max_displacement_m < REST_M)
+        return { error: "none: at rest", age: "", note: "", known: false };
     const notes = [
         diagnostic.replace(/([^.])$/, "$1."),
         locking ? "Volumetric locking: the true error is larger." : "",
@@ -74,7 +87,11 @@ export function errorText(estimate) {
         force_percent === undefined ? "" : `Force of tools: ${percent(force_percent)} off.`,
     ];
     const age = age_s > OLD_S ? `${short(Math.round(age_s))} s ago` : "";
-    return { error: millimetres(error_m), age, note: notes.filter(Boolean).join(" "), known: true };
+    const share =
+        positive(error_m) && positive(max_displacement_m) && error_m >= RESOLUTION_M
+            ? `, ${percent((100 * error_m) / max_displacement_m)} of what moves`
+            : "";
+    return { error: millimetres(error_m) + share, age, note: notes.filter(Boolean).join(" "), known: true };
 }
 
 /** the known parts of the error and their shares @param {Estimate} estimate */

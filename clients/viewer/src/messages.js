@@ -22,6 +22,7 @@ import { sameTools } from "./tool_marks.js";
 /** @template {ServerMessage["type"]} T @typedef {Extract<ServerMessage, {type: T}>} Of message of one type */
 
 const NOTICE_MS = 4000;
+const RECENT_S = 2; // an order that is news
 const RADIUS_SHARE = 0.02; // of the scene's size: tool radius if the server has none
 const REAL_TIME = 1.05; // slowdown that still counts as real time
 /** codes of `error` that answer a pending command of a panel */
@@ -32,6 +33,7 @@ export class Messages {
     constructor(page) {
         this.page = page;
         this.listed = ""; // components as the panel shows them
+        this.pausedBy = ""; // name of the member, "" unknown
     }
 
     /** @param {PageMessage} data */
@@ -88,7 +90,7 @@ export class Messages {
             case "members":
                 return this.members(message);
             case "orders":
-                return this.page.members.takeOrders(message);
+                return this.orders(message);
             case "error":
                 return this.error(message);
             case "answer":
@@ -117,6 +119,7 @@ export class Messages {
         input.radius = message.tools[Math.max(0, state.ownTool)]?.radius_m ?? RADIUS_SHARE * stage.size;
         bodies.truncate(message.parts.length);
         this.page.members.begin();
+        this.pausedBy = "";
         this.page.playback.begin(message.marks ?? []);
         state.plan = message;
         state.status = null;
@@ -148,6 +151,18 @@ export class Messages {
         fields.offer(false);
     }
 
+    /** @param {Of<"orders">} message */
+    orders(message) {
+        this.page.members.takeOrders(message);
+        for (const { id, name, verb, target, age_s } of message.orders) {
+            if (verb === "pause") this.pausedBy = name;
+            if (verb === "resume") this.pausedBy = "";
+            // what everybody sees happen has a name; older ones stand in the list
+            if (verb === "reset" && id !== this.page.state.ownId && age_s < RECENT_S)
+                this.page.layout.notice(`${name} reset ${target || "the scene"}.`, NOTICE_MS);
+        }
+    }
+
     /** @param {Of<"status">} message */
     status(message) {
         const { controls, layout, state } = this.page;
@@ -163,7 +178,7 @@ export class Messages {
         const text = playback
             ? playbackText(playback, message.paused)
             : message.paused
-              ? "paused"
+              ? `paused${this.pausedBy ? ` by ${this.pausedBy}` : ""}`
               : slow
                 ? `${(1 / message.slowdown).toFixed(2)} of real time`
                 : "live";

@@ -99,6 +99,7 @@ test("every point of the plot lies at its cost and error", () => {
     const plot = layOutPlot(
         POINTS,
         estimate({
+            study_point: 2,
             neighbours: [
                 { parameter: "resolution", label: "finer", cost_ms: 9, error_m: 4e-4, size: 20 },
                 { parameter: "step", label: "?", cost_ms: 9 },
@@ -120,24 +121,35 @@ test("every point of the plot lies at its cost and error", () => {
         );
     for (const { x, y } of [...plot.marks, ...plot.neighbours])
         assert.ok(x > BOX.left && x < BOX.right && y > BOX.top && y < BOX.bottom);
-    assert.ok(plot.live && plot.live.y !== null && Math.abs(plot.live.x - plot.x(4.4)) < 1e-9);
+    assert.ok(plot.live && Math.abs(plot.live.x - plot.x(4.4)) < 1e-9);
+});
+
+test("one axis has errors of one kind: those under the loads of the study", () => {
+    const neighbours = [{ parameter: "resolution", label: "finer", cost_ms: 9, error_m: 0.029, size: 20 }];
+    // a strong pull: 58 mm now, where the study's loads leave 1 mm
+    const pulled = layOutPlot(POINTS, estimate({ study_point: 2, error_m: 0.058, neighbours }), BOX);
+    assert.equal(pulled.studied, true);
+    assert.equal(pulled.live?.y, pulled.y(1e-3), "the running configuration has the error of its own point");
+    assert.equal(pulled.neighbours[0].y, pulled.y(0.5e-3), "a neighbour that halves the error has half of that");
+    assert.ok(pulled.errorRange.high <= 10, "the present error does not set the scale");
+    const other = layOutPlot(POINTS, estimate({ error_m: 0.058, neighbours }), BOX);
+    assert.equal(other.live?.y, null, "a configuration that was not studied has no error of that kind");
+    assert.equal(other.neighbours.length, 0);
+    const alone = layOutPlot([], estimate({ error_m: 0.058, neighbours }), BOX);
+    assert.equal(alone.studied, false);
+    assert.equal(alone.live?.y, alone.y(0.058));
 });
 
 test("the live point is drawn without a study, and without an error at its cost", () => {
     const alone = layOutPlot([], estimate({}), BOX);
     assert.ok(alone.live && alone.live.y !== null && alone.xTicks.length >= 2 && alone.yTicks.length >= 2);
-    const unknown = layOutPlot(POINTS, estimate({ error_m: undefined }), BOX);
+    const unknown = layOutPlot([], estimate({ error_m: undefined }), BOX);
     assert.equal(unknown.live?.y, null);
     assert.equal(layOutPlot([], null, BOX).live, null);
     const resting = layOutPlot([], estimate({ error_m: 4e-17 }), BOX);
     assert.ok(
         resting.errorRange.low >= 1e-6 && resting.errorRange.high <= 1e-3,
         "rounding errors do not set the scale",
-    );
-    const studied = layOutPlot(POINTS, estimate({ error_m: 4e-17 }), BOX);
-    assert.ok(
-        studied.errorRange.low >= 1e-3 && Number(studied.live?.y) > Math.max(...studied.marks.map((m) => m.y)),
-        "a body at rest lies below the studied points",
     );
 });
 
@@ -205,6 +217,14 @@ test("an error that is pending, unavailable or old is described so", () => {
         known: true,
     });
     assert.equal(errorText(estimate({ age_s: undefined })).age, "", "without an age");
+    assert.equal(errorText(estimate({ max_displacement_m: 0.009 })).error, "0.9 mm, 10 % of what moves");
+    assert.equal(errorText(estimate({ max_displacement_m: 9e-4 })).error, "0.9 mm, 100 % of what moves");
+    assert.deepEqual(errorText(estimate({ max_displacement_m: 1e-7, error_m: 4e-17 })), {
+        error: "none: at rest",
+        age: "",
+        note: "",
+        known: false,
+    });
     assert.equal(errorText(estimate({ force_percent: 12.34 })).note, "Force of tools: 12 % off.");
 });
 
