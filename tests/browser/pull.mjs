@@ -48,6 +48,22 @@ await run(async () => {
 
     const pixel = await organPixel(ada);
     check("the organ is visible", !!pixel);
+    const scale = await ada.evaluate(() => {
+        const { stage } = window.palpate;
+        const across = stage.target.clone().setFromMatrixColumn(stage.camera.matrixWorld, 0);
+        const [a, b] = [0, 0.01].map((m) => stage.project(stage.target.clone().addScaledVector(across, m)));
+        const bar = document.getElementById("scale");
+        return {
+            pixels: 100 * Math.hypot(b.x - a.x, b.y - a.y),
+            px: parseFloat(bar.style.width),
+            text: bar.textContent,
+        };
+    });
+    check(
+        "the scale bar is as long as it says",
+        Math.abs(scale.px / scale.pixels / (parseFloat(scale.text) / 1000) - 1) < 0.02,
+        `${scale.text} are ${scale.px} pixels, a metre ${scale.pixels.toFixed(0)}`,
+    );
     await ada.mouse.move(pixel.x, pixel.y);
     await ada.mouse.down();
     await drag(ada, pixel, 7, -8, 12);

@@ -17,6 +17,7 @@ import { withOwnTool } from "./own_tool.js";
 import { PlanPanel } from "./plan_panel.js";
 import { PlaybackBar } from "./playback_bar.js";
 import { PoseSender } from "./pose_sender.js";
+import { showScale } from "./scale_bar.js";
 import { SculptPanel } from "./sculpt_panel.js";
 import { Stage } from "./stage.js";
 import { takeTicket } from "./ticket.js";
@@ -123,6 +124,7 @@ function draw() {
             bodies.disposeRetired();
             marks.placeLabels();
             showForce();
+            showScale(htmlById("scale"), stage.pixelsPerMetre());
         }
     }
     if (now - countedAt > 1000) {

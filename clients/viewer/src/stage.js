@@ -261,6 +261,12 @@ export class Stage {
         setTimeout(poll, POLL_MS);
     }
 
+    /** of a metre at the depth of the middle of the view */
+    pixelsPerMetre() {
+        const half = Math.tan((this.camera.fov * Math.PI) / 360) * this.distance;
+        return ((this.canvas.clientHeight || 1) * this.camera.zoom) / (2 * half);
+    }
+
     /** ray through a pixel @param {number} x @param {number} y client pixels @returns {THREE.Ray} */
     ray(x, y) {
         const box = this.canvas.getBoundingClientRect();
