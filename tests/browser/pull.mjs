@@ -29,6 +29,11 @@ await run(async () => {
     const ada = await open(browsers[0], address, "Ada", { width: 1100, height: 720 });
     const ben = await open(browsers[1], address, "Ben", { width: 390, height: 780 });
 
+    // a body without a frame has no normals and would be black
+    const first = await ada.evaluate(() =>
+        [...window.palpate.state.bodies.values()].every((body) => body.shown || !body.mesh.visible),
+    );
+    check("no body is drawn before its first frame", first);
     const title = await ada.textContent("#title");
     check("the title names the organ", title.length > 3 && title !== "Palpate", title);
     await until(

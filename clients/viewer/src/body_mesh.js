@@ -48,7 +48,8 @@ export class BodyMesh {
         this.rest = rest;
         this.visible = visible;
         this.epoch = 0; // of its asset
-        this.shown = false; // a frame has been taken: there are normals
+        this.shown = false; // a frame has been taken: there are normals, without which it is black
+        this.wanted = true;
         this.geometry = new THREE.BufferGeometry();
         this.position = new THREE.BufferAttribute(rest.slice(), 3).setUsage(THREE.DynamicDrawUsage);
         this.normal = new THREE.BufferAttribute(new Float32Array(rest.length), 3).setUsage(THREE.DynamicDrawUsage);
@@ -62,6 +63,7 @@ export class BodyMesh {
         this.colours.material = this.mesh.material;
         if (isClosed(rest, triangles)) this.mesh.material.side = THREE.FrontSide;
         this.mesh.frustumCulled = false;
+        this.mesh.visible = false;
         // the surface lies slightly behind its lines
         Object.assign(this.mesh.material, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
         /** @type {THREE.Mesh<THREE.BufferGeometry, THREE.MeshBasicMaterial> | null} */
@@ -133,7 +135,10 @@ export class BodyMesh {
             positions: /** @type {Float32Array<ArrayBuffer>} */ (this.position.array),
             normals: /** @type {Float32Array<ArrayBuffer>} */ (this.normal.array),
         };
-        this.shown = true;
+        if (!this.shown) {
+            this.shown = true;
+            this.appear(this.wanted);
+        }
         this.position.array = positions;
         this.normal.array = normals;
         this.position.needsUpdate = true;
@@ -143,7 +148,8 @@ export class BodyMesh {
 
     /** a body is hidden before its first frame @param {boolean} on */
     appear(on) {
-        this.mesh.visible = on;
+        this.wanted = on;
+        this.mesh.visible = on && this.shown;
         if (this.lines && !on) this.lines.visible = false;
     }
 
