@@ -51,6 +51,19 @@ await run(async () => {
     const before = await settled(ben, () => 0.0005, 1.5);
     check("the organ comes to rest", before < 0.03, `${(1000 * before).toFixed(2)} mm`);
 
+    await ada.keyboard.press("?");
+    const help = ada.locator("#help");
+    check("? opens the help", await help.isVisible());
+    await ada.screenshot({ path: join(pictures, "help.png") });
+    await ada.keyboard.press("m");
+    check("which has the keyboard", (await ada.getAttribute("#mesh", "aria-pressed")) === "false");
+    await ada.keyboard.press("Escape");
+    check("and Escape closes it", await help.isHidden());
+    await ben.click("#help-open");
+    await ben.screenshot({ path: join(pictures, "help_phone.png") });
+    await ben.click("#help-close");
+    check("a button does both", await ben.locator("#help").isHidden());
+
     const pixel = await organPixel(ada);
     check("the organ is visible", !!pixel);
     const scale = await ada.evaluate(() => {

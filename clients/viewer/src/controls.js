@@ -1,5 +1,5 @@
 // The buttons at the foot of the page and the keys that do the same.
-import { buttonById, chooseByArrows, htmlById, markRadio } from "./dom.js";
+import { buttonById, byId, chooseByArrows, htmlById, markRadio } from "./dom.js";
 import { keyMap } from "./keys.js";
 
 /** @typedef {"pull" | "press" | "sculpt"} Mode what a drag does */
@@ -26,6 +26,7 @@ export class Controls {
         buttonById("mesh").onclick = () => this.toggleMesh();
         buttonById("accuracy-toggle").onclick = () => this.openAccuracy(!page.accuracy.opened);
         buttonById("panel-toggle").onclick = () => this.togglePanel();
+        buttonById("help-open").onclick = () => this.openHelp();
         this.addKeys();
         window.addEventListener("resize", () => this.place());
     }
@@ -43,15 +44,23 @@ export class Controls {
                 p: () => this.togglePanel(),
                 c: () => fields.chooseNext(),
                 m: () => this.toggleMesh(),
+                "?": () => this.openHelp(),
+                f1: () => this.openHelp(),
             },
             stage,
         );
         window.addEventListener("keydown", (e) => {
+            // an open dialog has the keyboard; it closes with Escape by itself
+            if (byId("help", HTMLDialogElement).open) return;
             const action = sculpt.key(e) ? () => {} : actionOf(e);
             if (!action) return;
             e.preventDefault();
             action();
         });
+    }
+
+    openHelp() {
+        byId("help", HTMLDialogElement).showModal();
     }
 
     /** @param {string} verb */
