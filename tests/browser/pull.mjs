@@ -8,6 +8,7 @@ import {
     displacement,
     drag,
     launch,
+    nextFrame,
     open,
     organPixel,
     palpate,
@@ -63,6 +64,21 @@ await run(async () => {
     await ben.screenshot({ path: join(pictures, "help_phone.png") });
     await ben.click("#help-close");
     check("a button does both", await ben.locator("#help").isHidden());
+
+    // light and dark by the system
+    const brightness = (page) =>
+        page.evaluate(() => {
+            const [r, g, b] = getComputedStyle(document.body).backgroundColor.match(/\d+/g).map(Number);
+            return (r + g + b) / 765;
+        });
+    const grounds = [];
+    for (const colorScheme of ["light", "dark"]) {
+        await ada.emulateMedia({ colorScheme });
+        grounds.push(await brightness(ada));
+        await nextFrame(ada);
+        await ada.screenshot({ path: join(pictures, `pull_${colorScheme}.png`) });
+    }
+    check("the page is light or dark as the system is", grounds[0] > 0.8 && grounds[1] < 0.2, grounds.join(" "));
 
     const pixel = await organPixel(ada);
     check("the organ is visible", !!pixel);

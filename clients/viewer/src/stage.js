@@ -65,7 +65,12 @@ export class Stage {
         this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
         this.renderer.toneMappingExposure = 1.0;
         this.scene = new THREE.Scene();
-        this.scene.background = makeBackdrop();
+        const light = window.matchMedia("(prefers-color-scheme: light)");
+        this.scene.background = makeBackdrop(light.matches);
+        light.addEventListener("change", () => {
+            this.scene.background = makeBackdrop(light.matches);
+            this.dirty = true;
+        });
         this.camera = new THREE.PerspectiveCamera(32, 1, 0.001, 100);
         this.up = new THREE.Vector3(0, 0, 1);
         this.target = new THREE.Vector3();
@@ -286,15 +291,15 @@ export class Stage {
 }
 
 /** @returns {THREE.Texture} a dark vertical gradient */
-function makeBackdrop() {
+/** @param {boolean} light */
+function makeBackdrop(light) {
     const canvas = document.createElement("canvas");
     canvas.width = 2;
     canvas.height = 256;
     const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     const gradient = context.createLinearGradient(0, 0, 0, 256);
-    gradient.addColorStop(0, "#1d2831");
-    gradient.addColorStop(0.55, "#141b22");
-    gradient.addColorStop(1, "#0b0f13");
+    const colours = light ? ["#eef3f7", "#dde5ec", "#c3ced8"] : ["#1d2831", "#141b22", "#0b0f13"];
+    [0, 0.55, 1].forEach((at, i) => gradient.addColorStop(at, colours[i]));
     context.fillStyle = gradient;
     context.fillRect(0, 0, 2, 256);
     const texture = new THREE.CanvasTexture(canvas);

@@ -100,7 +100,7 @@ export class ToolMarks {
                 mark.arrow.setColor(tool.colour);
             }
             mark.label.textContent = i === mine ? "you" : nameOf(tool.holder, i);
-            mark.label.style.color = cssColour(tool.colour);
+            mark.label.style.setProperty("--who", cssColour(tool.colour));
         });
         for (let i = tools.length; i < this.marks.length; i++)
             this.marks[i].shown = this.marks[i].ball.visible = this.marks[i].arrow.visible = false;
