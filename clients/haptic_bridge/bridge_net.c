@@ -145,6 +145,13 @@ static void ws_state(void *user, pal_link_state state, int code, const char *rea
     pal_log(PAL_LOG_WARN, "server", "connection lost: %d %s", code, reason);
 }
 
+/* the session's name is a regular expression in the subscription */
+static bool lcm_wants(void *user, const char *channel)
+{
+    const pal_bridge_net *n = user;
+    return pal_lcm_channel_index(channel, pal_lcm_link_prefix(n->lcm), n->o.session, "HMODEL") == n->o.tool;
+}
+
 /* models on LCM; a server that counts from the start again after a pause is another session */
 static void lcm_model(void *user, const char *channel, const void *bytes, size_t n_byte, uint64_t source)
 {
@@ -349,11 +356,11 @@ static pal_err net_open_ws(pal_bridge_net *n, pal_diagnostic *diag)
 
 static pal_err net_open_lcm(pal_bridge_net *n, pal_diagnostic *diag)
 {
-    static const pal_lcm_events events = {lcm_model, lcm_refused};
+    static const pal_lcm_events events = {lcm_wants, lcm_model, lcm_refused};
+    const pal_lcm_options lcm = {n->o.server, n->o.channel, n->o.lcm_key};
     char channel[PAL_LCM_CHANNEL_MAX + 1];
-    PAL_TRY(pal_lcm_link_open(n->loop, n->o.server, &events, n, diag, &n->lcm));
-    if (n->o.lcm_key) PAL_TRY(pal_lcm_link_use_keys(n->lcm, n->o.lcm_key, diag));
-    pal_lcm_channel(channel, n->o.session, "HMODEL", n->o.tool);
+    PAL_TRY(pal_lcm_link_open(n->loop, &lcm, &events, n, diag, &n->lcm));
+    snprintf(channel, sizeof channel, ".*/HMODEL/%d", n->o.tool);
     return pal_lcm_link_subscribe(n->lcm, channel, palpate_haptic_model_t_get_type_info());
 }
 

@@ -10,7 +10,8 @@ typedef struct pal_bridge_net pal_bridge_net;
 
 typedef struct pal_bridge_net_options {
     const char *server;   /* ws://host:port/ws or lcm://group:port?ttl=0; borrowed */
-    const char *lcm_key;  /* LCM: key file, NULL: none; borrowed */
+    const char *channel;  /* LCM: prefix of channels, NULL: PALPATE1; borrowed */
+    const char *lcm_key;  /* LCM: key file, NULL: PALPATE_LCM_KEY, or none; borrowed */
     const char *session;  /* LCM: session name in the channels; borrowed */
     const char *name;     /* of the member; borrowed                                 */
     int tool;             /* index; with a websocket also PAL_WIRE_TOOL_ANY */

@@ -330,22 +330,43 @@ static void hear_other(pal_lcm_bridge *b, uint64_t source)
     if (source == pal_lcm_link_source(b->lcm) || (b->other_ns && now - b->other_ns < OTHER_NS)) return;
     b->other_ns = now;
     b->count.n_other++;
-    pal_log(PAL_LOG_WARN, "lcm_session",
-            "another palpate-lcm takes the session %s to this bus: give one of them another name with --session",
-            b->session);
+    pal_log(
+        PAL_LOG_WARN, "lcm_session",
+        "another palpate-lcm takes the session %s to the channels %s of this bus: give each rig its own with --channel",
+        b->session, pal_lcm_link_prefix(b->lcm));
+}
+
+static bool is_channel(const pal_lcm_bridge *b, const char *channel, const char *what)
+{
+    char own[PAL_LCM_CHANNEL_MAX + 1];
+    pal_lcm_channel(own, pal_lcm_link_prefix(b->lcm), b->session, what, -1);
+    return !strcmp(channel, own);
+}
+
+/* -1: not of a tool of this session */
+static int tool_of(const pal_lcm_bridge *b, const char *channel)
+{
+    const int index = pal_lcm_channel_index(channel, pal_lcm_link_prefix(b->lcm), b->session, "TOOL");
+    return index < PAL_WIRE_TOOL_MAX ? index : -1;
+}
+
+/* what other sessions of the bus say is no concern of this one, whoever has signed it */
+static bool bridge_lcm_wants(void *user, const char *channel)
+{
+    const pal_lcm_bridge *b = user;
+    return b->session[0] &&
+           (tool_of(b, channel) >= 0 || is_channel(b, channel, "ORDER") || is_channel(b, channel, "STATUS"));
 }
 
 static void bridge_lcm_message(void *user, const char *channel, const void *bytes, size_t n_byte, uint64_t source)
 {
     pal_lcm_bridge *b = user;
-    const int index = pal_lcm_channel_index(channel, b->session, "TOOL");
-    char own[PAL_LCM_CHANNEL_MAX + 1];
-    pal_lcm_channel(own, b->session, "ORDER", -1);
-    if (!strcmp(channel, own)) pal_lcm_orders_take(&b->orders, bytes, n_byte, source);
-    pal_lcm_channel(own, b->session, "STATUS", -1);
-    if (!strcmp(channel, own)) hear_other(b, source);
-    if (index < 0) return;
-    if (index < PAL_WIRE_TOOL_MAX && (uint32_t)index < b->n_tool)
+    const int index = tool_of(b, channel);
+    if (is_channel(b, channel, "ORDER"))
+        pal_lcm_orders_take(&b->orders, bytes, n_byte, source);
+    else if (is_channel(b, channel, "STATUS"))
+        hear_other(b, source);
+    else if ((uint32_t)index < b->n_tool)
         bridge_state(b, index, bytes, n_byte, source);
     else
         b->count.n_state_refused++;
@@ -392,7 +413,7 @@ pal_err pal_lcm_bridge_open(pal_link_loop *loop, const pal_lcm_bridge_options *o
                             pal_lcm_bridge **out)
 {
     static const pal_link_events watcher_events = {watcher_state, watcher_control, watcher_message, NULL};
-    static const pal_lcm_events lcm_events = {bridge_lcm_message, bridge_lcm_refused};
+    static const pal_lcm_events lcm_events = {bridge_lcm_wants, bridge_lcm_message, bridge_lcm_refused};
     pal_lcm_bridge *b = calloc(1, sizeof *b);
     if (!b) return PAL_ERR_MEMORY;
     b->loop = loop;
@@ -407,12 +428,10 @@ pal_err pal_lcm_bridge_open(pal_link_loop *loop, const pal_lcm_bridge_options *o
                                    .topology_deltas = true,
                                    .events = &watcher_events,
                                    .user = b};
-    pal_err err = pal_lcm_link_open(loop, options->lcm, &lcm_events, b, diag, &b->lcm);
-    if (!err && options->key_file) err = pal_lcm_link_use_keys(b->lcm, options->key_file, diag);
-    if (!err) err = pal_lcm_link_subscribe(b->lcm, PAL_LCM_PREFIX "/.*/TOOL/.*", palpate_tool_state_t_get_type_info());
-    if (!err) err = pal_lcm_link_subscribe(b->lcm, PAL_LCM_PREFIX "/.*/ORDER", palpate_order_t_get_type_info());
-    if (!err)
-        err = pal_lcm_link_subscribe(b->lcm, PAL_LCM_PREFIX "/.*/STATUS", palpate_session_status_t_get_type_info());
+    pal_err err = pal_lcm_link_open(loop, &options->lcm, &lcm_events, b, diag, &b->lcm);
+    if (!err) err = pal_lcm_link_subscribe(b->lcm, ".*/TOOL/.*", palpate_tool_state_t_get_type_info());
+    if (!err) err = pal_lcm_link_subscribe(b->lcm, ".*/ORDER", palpate_order_t_get_type_info());
+    if (!err) err = pal_lcm_link_subscribe(b->lcm, ".*/STATUS", palpate_session_status_t_get_type_info());
     if (!err && !(b->store = pal_asset_store_create(loop, b->server, asset_changed, b))) err = PAL_ERR_MEMORY;
     b->orders = (pal_lcm_orders){.loop = loop, .lcm = b->lcm, .server = b->server, .session = b->session};
     if (!err) err = pal_link_open(loop, &link, diag, &b->watcher);

@@ -1,7 +1,7 @@
 /* palpate.v2 on one side, LCM on the other: what palpate-lcm does.
  *
  * One watching member takes frames and status to LCM; each tool whose states come in on
- * PALPATE1/<session>/TOOL/<n> gets a trainee member of its own that takes tool n, passes the newest state on as POSE
+ * <prefix>/<session>/TOOL/<n> gets a trainee member of its own that takes tool n, passes the newest state on as POSE
  * (at most 245 a second) and brings HAPTIC back as HMODEL/<n>; after 5 s of silence it gives the tool back.
  * Types: lcmtypes/. Out:
  *   - BODY/<part>, body_frame_t: the FRAME message byte for byte. Repeated after 1 s without change, so that a late
@@ -21,10 +21,9 @@
 typedef struct pal_lcm_bridge pal_lcm_bridge;
 
 typedef struct pal_lcm_bridge_options {
-    const char *server;   /* ws://host:port/ws; borrowed                      */
-    const char *lcm;      /* URL of the bus; borrowed                         */
-    const char *session;  /* name in channels; NULL: the server's; borrowed   */
-    const char *key_file; /* of the bus (lcm_seal.h), NULL: none; borrowed    */
+    const char *server;  /* ws://host:port/ws; borrowed                      */
+    const char *session; /* name in channels; NULL: the server's; borrowed   */
+    pal_lcm_options lcm; /* the bus                                          */
 } pal_lcm_bridge_options;
 
 typedef struct pal_lcm_bridge_counts {

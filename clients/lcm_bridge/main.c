@@ -10,15 +10,17 @@
 int main(int argc, char **argv)
 {
     const char *server = "ws://127.0.0.1:8090/ws", *lcm = "udpm://239.255.76.67:7667?ttl=0", *session = NULL,
-               *key_file = NULL;
+               *key_file = NULL, *channel = NULL;
     pal_flag_common common;
     double seconds = 0;
     const pal_flag flag[] = {
         {"--server", "URL", PAL_FLAG_TEXT, &server, 0, 0, "palpate server (ws://127.0.0.1:8090/ws)"},
         {"--lcm", "URL", PAL_FLAG_TEXT, &lcm, 0, 0, "LCM bus (udpm://239.255.76.67:7667?ttl=0)"},
         {"--session", "NAME", PAL_FLAG_TEXT, &session, 0, 0, "name in the channels (the server's)"},
+        {"--channel", "PREFIX", PAL_FLAG_TEXT, &channel, 0, 0, "of the channels; one a rig (PALPATE1)"},
         {"--lcm-key", "FILE", PAL_FLAG_TEXT, &key_file, 0, 0,
-         "key file: sign what goes to the bus, and take only what was signed with a key in it"},
+         "key file: sign what goes to the bus, and take only what was signed with a key in it (PALPATE_LCM_KEY, or "
+         "none)"},
         {"--seconds", "S", PAL_FLAG_NUMBER, &seconds, 0.1, 1e6, "end after this time (never)"},
     };
     const pal_flag_table table = {
@@ -26,7 +28,7 @@ int main(int argc, char **argv)
         .usage = "[flags]",
         .about =
             "Takes a session to an LCM bus: body frames, status and haptic models out, tool states in, on channels\n"
-            "PALPATE1/<session>/...; the types are in lcmtypes/.\n",
+            "PREFIX/<session>/...; the types are in lcmtypes/.\n",
         PAL_FLAGS(flag)};
     const int code = pal_flags_parse(&table, argc, argv, &common, NULL, NULL);
     if (code >= 0) return code;
@@ -36,7 +38,8 @@ int main(int argc, char **argv)
     pal_lcm_bridge *bridge = NULL;
     pal_err err = pal_link_loop_create(&loop);
     if (!err)
-        err = pal_lcm_bridge_open(loop, &(pal_lcm_bridge_options){server, lcm, session, key_file}, &diag, &bridge);
+        err = pal_lcm_bridge_open(loop, &(pal_lcm_bridge_options){server, session, {lcm, channel, key_file}}, &diag,
+                                  &bridge);
     if (!err) err = pal_link_stop_on_signals(loop);
     if (err)
         fprintf(stderr, "palpate-lcm: %s\n", diag.text[0] ? diag.text : pal_err_text(err));

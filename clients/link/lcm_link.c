@@ -25,7 +25,7 @@ typedef struct lcm_subscriber {
 
 struct pal_lcm_link {
     pal_link_loop *loop;
-    char url[LCM_URL_BYTES];
+    char url[LCM_URL_BYTES], prefix[PAL_LCM_PREFIX_MAX + 1];
     bool memory, warned;
     const pal_lcm_events *events;
     void *user;
@@ -86,6 +86,7 @@ static void lcm_received(const lcm_recv_buf_t *buffer, const char *channel, void
     pal_lcm_link *link = s->link;
     size_t n_byte = buffer->data_size;
     uint64_t source = 0;
+    if (link->events->wants && !link->events->wants(link->user, channel)) return;
     const pal_walk walk = pal_lcm_walk(s->type, buffer->data, pal_seal_begin(buffer->data, n_byte));
     /* its own come back from the bus */
     if (!walk && !link->memory && pal_seal_source(buffer->data, n_byte) == link->source) return;
@@ -162,13 +163,37 @@ static pal_err lcm_url(char out[LCM_URL_BYTES], const char *url, bool *memory, p
     return n < LCM_URL_BYTES ? PAL_ERR_OK : PAL_REFUSE(diag, "%s: too long", url);
 }
 
-pal_err pal_lcm_link_open(pal_link_loop *loop, const char *url, const pal_lcm_events *events, void *user,
+/* no character of it has a meaning in the regular expressions of LCM but '.', and `wants` compares */
+static pal_err set_prefix(pal_lcm_link *link, const char *prefix, pal_diagnostic *diag)
+{
+    size_t n = 0;
+    if (!prefix) prefix = PAL_LCM_PREFIX;
+    while (isalnum((unsigned char)prefix[n]) || (prefix[n] && strchr(".-_", prefix[n]))) n++;
+    if (n == 0 || prefix[n] || n > PAL_LCM_PREFIX_MAX)
+        return PAL_REFUSE(diag, "%.32s: a prefix of channels has 1 to %d letters, digits, '.', '-' or '_'", prefix,
+                          PAL_LCM_PREFIX_MAX);
+    memcpy(link->prefix, prefix, n + 1);
+    return PAL_ERR_OK;
+}
+
+static pal_err use_keys(pal_lcm_link *link, const char *key_file, pal_diagnostic *diag)
+{
+    if (!key_file) key_file = getenv("PALPATE_LCM_KEY");
+    if (!key_file || !*key_file) return PAL_ERR_OK;
+    PAL_TRY(pal_key_file_read(key_file, &link->keys, diag));
+    link->is_keyed = true;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_lcm_link_open(pal_link_loop *loop, const pal_lcm_options *options, const pal_lcm_events *events, void *user,
                           pal_diagnostic *diag, pal_lcm_link **out)
 {
     pal_lcm_link *link = calloc(1, sizeof *link);
     if (!link) return PAL_ERR_MEMORY;
     *link = (pal_lcm_link){.events = events, .user = user};
-    pal_err err = lcm_url(link->url, url, &link->memory, diag);
+    pal_err err = lcm_url(link->url, options->url, &link->memory, diag);
+    if (!err) err = set_prefix(link, options->prefix, diag);
+    if (!err) err = use_keys(link, options->key_file, diag);
     /* a memory queue belongs to its caller's own loop of calls */
     link->loop = link->memory ? NULL : loop;
     if (!err) err = pal_random_bytes(&link->source, sizeof link->source);
@@ -184,16 +209,19 @@ pal_err pal_lcm_link_open(pal_link_loop *loop, const char *url, const pal_lcm_ev
     return PAL_ERR_OK;
 }
 
-pal_err pal_lcm_link_use_keys(pal_lcm_link *link, const char *key_file, pal_diagnostic *diag)
-{
-    PAL_TRY(pal_key_file_read(key_file, &link->keys, diag));
-    link->is_keyed = true;
-    return PAL_ERR_OK;
-}
-
 uint64_t pal_lcm_link_source(const pal_lcm_link *link)
 {
     return link->source;
+}
+
+const char *pal_lcm_link_prefix(const pal_lcm_link *link)
+{
+    return link->prefix;
+}
+
+bool pal_lcm_link_is_keyed(const pal_lcm_link *link)
+{
+    return link->is_keyed;
 }
 
 void pal_lcm_link_close(pal_lcm_link *link)
@@ -210,7 +238,7 @@ pal_err pal_lcm_link_subscribe(pal_lcm_link *link, const char *channel, const lc
     lcm_subscriber *s = &link->subscriber[link->n_subscriber++];
     s->link = link;
     s->type = type;
-    strncpy(s->channel, channel, sizeof s->channel - 1);
+    snprintf(s->channel, sizeof s->channel, "%s/%s", link->prefix, channel);
     return link->lcm ? lcm_attach(link, s) : PAL_ERR_OK;
 }
 
@@ -228,7 +256,7 @@ pal_err pal_lcm_link_publish(pal_lcm_link *link, const char *session, const char
     }
     const int n_byte = type->encode(link->buffer, 0, wanted, message);
     if (n_byte < 0) return PAL_ERR_REFUSED;
-    pal_lcm_channel(channel, session, what, n);
+    pal_lcm_channel(channel, link->prefix, session, what, n);
     const int64_t now_us = unix_us();
     link->sent_us = now_us > link->sent_us ? now_us : link->sent_us + 1;
     if (!pal_seal_put(link->buffer + n_byte, link->source, link->sent_us, channel, link->buffer, (size_t)n_byte,
@@ -244,7 +272,8 @@ void pal_lcm_link_handle(pal_lcm_link *link)
     }
 }
 
-void pal_lcm_channel(char channel[PAL_LCM_CHANNEL_MAX + 1], const char *session, const char *what, int n)
+void pal_lcm_channel(char channel[PAL_LCM_CHANNEL_MAX + 1], const char *prefix, const char *session, const char *what,
+                     int n)
 {
     char clean[32], number[16] = "";
     size_t k = 0;
@@ -254,15 +283,15 @@ void pal_lcm_channel(char channel[PAL_LCM_CHANNEL_MAX + 1], const char *session,
     }
     clean[k] = 0;
     if (n >= 0) snprintf(number, sizeof number, "/%d", n);
-    snprintf(channel, PAL_LCM_CHANNEL_MAX + 1, PAL_LCM_PREFIX "/%s/%.12s%.6s", clean, what, number);
+    snprintf(channel, PAL_LCM_CHANNEL_MAX + 1, "%.12s/%s/%.12s%.6s", prefix, clean, what, number);
 }
 
-int pal_lcm_channel_index(const char *channel, const char *session, const char *what)
+int pal_lcm_channel_index(const char *channel, const char *prefix, const char *session, const char *what)
 {
     const char *slash = strrchr(channel, '/');
     if (!slash || !isdigit((unsigned char)slash[1]) || strlen(slash + 1) > 3) return -1;
     const int n = atoi(slash + 1);
     char wanted[PAL_LCM_CHANNEL_MAX + 1];
-    pal_lcm_channel(wanted, session, what, n);
+    pal_lcm_channel(wanted, prefix, session, what, n);
     return strcmp(wanted, channel) ? -1 : n;
 }

@@ -91,6 +91,10 @@ const char *pal_seal_admit(pal_seal_senders *senders, const char *channel, const
         k++;
     }
     if (k == PAL_SEAL_CHANNELS) {
+        /* a signed message may be as early as it may be late */
+        const uint64_t kept_ns = keys ? 2000ull * PAL_SEAL_AGE_US : PAL_SEAL_SILENCE_NS;
+        if (senders->at[silent].heard_ns && now_ns - senders->at[silent].heard_ns < kept_ns)
+            return "too many channels are in use";
         memset(&senders->at[k = silent], 0, sizeof senders->at[k]);
         snprintf(senders->at[k].channel, sizeof senders->at[k].channel, "%s", channel);
     }

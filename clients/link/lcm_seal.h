@@ -13,7 +13,7 @@
 
 #include <stddef.h>
 
-enum { PAL_SEAL_BYTES = 40, PAL_SEAL_CHANNELS = 32, PAL_SEAL_CHANNEL_BYTES = 64 };
+enum { PAL_SEAL_BYTES = 40, PAL_SEAL_CHANNELS = 64, PAL_SEAL_CHANNEL_BYTES = 64 };
 
 /* key NULL: unsigned. out [PAL_SEAL_BYTES]; false: the library of ciphers failed */
 bool pal_seal_put(uint8_t *out, uint64_t source, int64_t sent_us, const char *channel, const uint8_t *bytes,
@@ -23,7 +23,8 @@ size_t pal_seal_begin(const uint8_t *bytes, size_t n_byte);
 
 uint64_t pal_seal_source(const uint8_t *bytes, size_t n_byte); /* as the seal says, unchecked; 0: there is none */
 
-/* the sources of channels; zeroed at first. Of more channels the one that was silent longest is forgotten */
+/* the sources of channels; zeroed at first. When all are taken, a new channel replaces one whose sender is silent, and
+ * from which nothing recorded can come again; else it is refused, so that made-up channels push out nobody */
 typedef struct pal_seal_senders {
     struct {
         char channel[PAL_SEAL_CHANNEL_BYTES];

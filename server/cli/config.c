@@ -37,6 +37,7 @@ const pal_flag pal_config_keys[PAL_CONFIG_KEYS] = {
     {"lcm", "URL", PAL_FLAG_TEXT, NULL, 0, 0, "also speak LCM there, in a process of its own (off)"},
     {"lcm_key", "FILE", PAL_FLAG_TEXT, NULL, 0, 0,
      "key file of that bus: only what is signed with a key in it moves tools (none)"},
+    {"lcm_channel", "PREFIX", PAL_FLAG_TEXT, NULL, 0, 0, "of the channels of that bus; one a rig (PALPATE1)"},
     {"log", levels, PAL_FLAG_WORD, NULL, 0, 0, "what is logged (info)"},
     {"record", "FILE", PAL_FLAG_TEXT, NULL, 0, 0, "write the input log there, for palpate replay (off)"},
 };
@@ -46,8 +47,8 @@ static const size_t place[PAL_CONFIG_KEYS] = {
     offsetof(pal_config, hosts),  offsetof(pal_config, tls_cert), offsetof(pal_config, tls_key),
     offsetof(pal_config, health), offsetof(pal_config, open),     offsetof(pal_config, keys),
     offsetof(pal_config, viewer), offsetof(pal_config, error_m),  offsetof(pal_config, max_clients),
-    offsetof(pal_config, lcm),    offsetof(pal_config, lcm_key),  offsetof(pal_config, log),
-    offsetof(pal_config, record),
+    offsetof(pal_config, lcm),    offsetof(pal_config, lcm_key),  offsetof(pal_config, lcm_channel),
+    offsetof(pal_config, log),    offsetof(pal_config, record),
 };
 
 void pal_config_default(pal_config *config)

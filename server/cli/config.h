@@ -9,7 +9,7 @@
 #include "server/base/flags.h"
 #include "server/base/log.h"
 
-enum { PAL_CONFIG_TEXT = 256, PAL_CONFIG_KEYS = 16 };
+enum { PAL_CONFIG_TEXT = 256, PAL_CONFIG_KEYS = 17 };
 
 typedef struct pal_config {
     char listen[PAL_CONFIG_TEXT]; /* "127.0.0.1"                                                         */
@@ -17,16 +17,17 @@ typedef struct pal_config {
     bool allow_remote;            /* false: only loopback addresses may be listened on                   */
     char hosts[PAL_CONFIG_TEXT];  /* "a,b": names by which other machines reach it                      */
     char tls_cert[PAL_CONFIG_TEXT], tls_key[PAL_CONFIG_TEXT]; /* PEM files; "": no TLS              */
-    char health[PAL_CONFIG_TEXT];  /* "9090", "0.0.0.0:9090"; "": on the main port                        */
-    bool open;                     /* whoever connects is what it asks to be; false: by ticket           */
-    char keys[PAL_CONFIG_TEXT];    /* key file of tickets; "": none                                      */
-    char viewer[PAL_CONFIG_TEXT];  /* folder of the page's files; "": the one beside the program          */
-    double error_m;                /* bound of streamed positions; 0: 1/3000 of the box, at most 0.05 mm  */
-    int max_clients;               /* 200                                                                 */
-    char lcm[PAL_CONFIG_TEXT];     /* LCM URL: start palpate-lcm with it; "": no LCM                      */
-    char lcm_key[PAL_CONFIG_TEXT]; /* key file of that bus; "": none */
-    char log[PAL_CONFIG_TEXT];     /* "error" | "warn" | "info" | "debug"; info                           */
-    char record[PAL_CONFIG_TEXT];  /* write the input log there; "": do not                               */
+    char health[PAL_CONFIG_TEXT];      /* "9090", "0.0.0.0:9090"; "": on the main port                        */
+    bool open;                         /* whoever connects is what it asks to be; false: by ticket           */
+    char keys[PAL_CONFIG_TEXT];        /* key file of tickets; "": none                                      */
+    char viewer[PAL_CONFIG_TEXT];      /* folder of the page's files; "": the one beside the program          */
+    double error_m;                    /* bound of streamed positions; 0: 1/3000 of the box, at most 0.05 mm  */
+    int max_clients;                   /* 200                                                                 */
+    char lcm[PAL_CONFIG_TEXT];         /* LCM URL: start palpate-lcm with it; "": no LCM                      */
+    char lcm_key[PAL_CONFIG_TEXT];     /* key file of that bus; "": none */
+    char lcm_channel[PAL_CONFIG_TEXT]; /* prefix of the channels of that bus; "": PALPATE1 */
+    char log[PAL_CONFIG_TEXT];         /* "error" | "warn" | "info" | "debug"; info                           */
+    char record[PAL_CONFIG_TEXT];      /* write the input log there; "": do not                               */
 } pal_config;
 
 /* a key, for manuals and checks: its name ("allow_remote"), value, range and help; out is unused */

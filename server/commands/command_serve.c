@@ -259,8 +259,9 @@ static pal_err find_lcm(serve_run *run, pal_diagnostic *diag)
 static void become_lcm(const serve_run *run, const lcm_child *child)
 {
     sigset_t none;
-    const char *argv[9] = {"palpate-lcm", "--server", child->server, "--lcm", run->config.lcm};
+    const char *argv[11] = {"palpate-lcm", "--server", child->server, "--lcm", run->config.lcm};
     int n = 5;
+    if (run->config.lcm_channel[0]) argv[n++] = "--channel", argv[n++] = run->config.lcm_channel;
     if (run->config.lcm_key[0]) argv[n++] = "--lcm-key", argv[n++] = run->config.lcm_key;
     if (run->common.quiet) argv[n++] = "--quiet";
     prctl(PR_SET_PDEATHSIG, SIGTERM);

@@ -1,6 +1,7 @@
 /* Gives an order on the bus, three times as senders do, and prints what the session reports: "done TEXT" or "refused
  * CODE TEXT". With TRIANGLES N it waits for a table of N triangles or more instead, and prints their number. Ends with
- * 1 when nothing comes within S seconds. usage: order_lcm S BUS SESSION KEY_FILE|- VERB|TRIANGLES [KEY=VALUE|N]... */
+ * 1 when nothing comes within S seconds. usage:
+ * [CHANNEL=PREFIX] order_lcm S BUS SESSION KEY_FILE|- VERB|TRIANGLES [KEY=VALUE|N]... */
 #include "clients/link/lcm_link.h"
 #include "palpate_answer_t.h"
 #include "palpate_order_t.h"
@@ -41,6 +42,14 @@ static void heard(void *user, const char *channel, const void *bytes, size_t n_b
     pal_link_stop(loop);
 }
 
+static bool wants(void *user, const char *channel)
+{
+    char own[PAL_LCM_CHANNEL_MAX + 1];
+    (void)user;
+    pal_lcm_channel(own, pal_lcm_link_prefix(lcm), session, "", -1);
+    return !strncmp(channel, own, strlen(own));
+}
+
 static void give(void *user)
 {
     static int n_given;
@@ -50,11 +59,10 @@ static void give(void *user)
 
 int main(int argc, char **argv)
 {
-    static const pal_lcm_events events = {heard, NULL};
+    static const pal_lcm_events events = {wants, heard, NULL};
     static char *key[16], none[] = "";
     static double value[16];
     pal_diagnostic diag = {""};
-    char channel[64];
     if (argc < 6) return 2;
     session = argv[3];
     order = (palpate_order_t){
@@ -66,11 +74,10 @@ int main(int argc, char **argv)
         *equal = 0, key[order.n_arg] = argv[i], value[order.n_arg++] = atof(equal + 1);
     }
     pal_err err = pal_link_loop_create(&loop);
-    if (!err) err = pal_lcm_link_open(loop, argv[2], &events, NULL, &diag, &lcm);
-    if (!err && strcmp(argv[4], "-")) err = pal_lcm_link_use_keys(lcm, argv[4], &diag);
-    pal_lcm_channel(channel, session, "ANSWER", -1);
-    if (!err) err = pal_lcm_link_subscribe(lcm, channel, palpate_answer_t_get_type_info());
-    if (!err) err = pal_lcm_link_subscribe(lcm, "PALPATE1/.*/TRIANGLES/.*", palpate_triangles_t_get_type_info());
+    const pal_lcm_options bus = {argv[2], getenv("CHANNEL"), strcmp(argv[4], "-") ? argv[4] : NULL};
+    if (!err) err = pal_lcm_link_open(loop, &bus, &events, NULL, &diag, &lcm);
+    if (!err) err = pal_lcm_link_subscribe(lcm, ".*/ANSWER", palpate_answer_t_get_type_info());
+    if (!err) err = pal_lcm_link_subscribe(lcm, ".*/TRIANGLES/.*", palpate_triangles_t_get_type_info());
     if (!err && !n_wanted && !pal_link_add_timer(loop, 200000, give, NULL)) err = PAL_ERR_MEMORY;
     if (err) fprintf(stderr, "order_lcm: %s\n", diag.text);
     if (!err) pal_link_run_for(loop, atof(argv[1]));

@@ -9,7 +9,11 @@
 #include "palpate_order_t.h"
 #include "palpate_session_status_t.h"
 #include "palpate_triangles_t.h"
+#include "server/base/key_file.h"
 #include "tests/check.h"
+
+#include <sys/stat.h>
+#include <unistd.h>
 
 static char text16[] = "sixteen letters!", text3[] = "abc", text0[] = "";
 
@@ -300,6 +304,7 @@ static void haptic_model_survives_the_way_to_lcm_and_back(void)
     CHECK_INT(pal_lcm_to_haptic(bytes, n, &back), PAL_ERR_REFUSED);
 }
 
+static const pal_lcm_options memory = {.url = "memq://"};
 static int heard, refused;
 static pal_wire_pose heard_pose;
 static char heard_channel[64];
@@ -318,10 +323,10 @@ static void on_refused(void *user, const char *channel, const char *reason)
 
 static void states_of_many_tools_come_through_the_memory_bus(void)
 {
-    static const pal_lcm_events events = {on_message, on_refused};
+    static const pal_lcm_events events = {NULL, on_message, on_refused};
     pal_lcm_link *link = NULL;
-    REQUIRE(pal_lcm_link_open(NULL, "memq://", &events, NULL, NULL, &link) == PAL_ERR_OK);
-    CHECK_INT(pal_lcm_link_subscribe(link, "PALPATE1/.*/TOOL/.*", palpate_tool_state_t_get_type_info()), PAL_ERR_OK);
+    REQUIRE(pal_lcm_link_open(NULL, &memory, &events, NULL, NULL, &link) == PAL_ERR_OK);
+    CHECK_INT(pal_lcm_link_subscribe(link, ".*/TOOL/.*", palpate_tool_state_t_get_type_info()), PAL_ERR_OK);
     for (int tool = 0; tool < 8; tool++) {
         palpate_tool_state_t state = a_state();
         state.tool = (int16_t)tool;
@@ -330,7 +335,7 @@ static void states_of_many_tools_come_through_the_memory_bus(void)
         pal_lcm_link_handle(link);
         CHECK_INT(heard, tool + 1);
         CHECK_INT(heard_pose.tool, tool);
-        CHECK_INT(pal_lcm_channel_index(heard_channel, "main", "TOOL"), tool);
+        CHECK_INT(pal_lcm_channel_index(heard_channel, PAL_LCM_PREFIX, "main", "TOOL"), tool);
     }
     /* another type on the same channel never reaches the decoder */
     const palpate_haptic_event_t event = {.text = text3};
@@ -339,6 +344,65 @@ static void states_of_many_tools_come_through_the_memory_bus(void)
     pal_lcm_link_handle(link);
     CHECK_INT(refused, 1);
     CHECK_INT(heard, 8);
+    pal_lcm_link_close(link);
+}
+
+static bool wants_first(void *user, const char *channel)
+{
+    (void)user;
+    return pal_lcm_channel_index(channel, "left", "main", "TOOL") == 0;
+}
+
+/* another rig, with a prefix of its own, is neither heard nor refused */
+static void a_rig_has_channels_of_its_own(void)
+{
+    static const pal_lcm_events events = {wants_first, on_message, on_refused};
+    const pal_lcm_options left = {.url = "memq://", .prefix = "left"};
+    const palpate_tool_state_t state = a_state();
+    const palpate_haptic_event_t event = {.text = text3};
+    pal_lcm_link *link = NULL;
+    heard = refused = 0;
+    REQUIRE(pal_lcm_link_open(NULL, &left, &events, NULL, NULL, &link) == PAL_ERR_OK);
+    CHECK_TEXT(pal_lcm_link_prefix(link), "left");
+    pal_lcm_link_subscribe(link, ".*/TOOL/.*", palpate_tool_state_t_get_type_info());
+    for (int tool = 0; tool < 3; tool++) {
+        CHECK_INT(pal_lcm_link_publish(link, "main", "TOOL", tool, palpate_tool_state_t_get_type_info(), &state), 0);
+        CHECK_INT(pal_lcm_link_publish(link, "other", "TOOL", tool, palpate_haptic_event_t_get_type_info(), &event), 0);
+        pal_lcm_link_handle(link);
+    }
+    CHECK_INT(heard, 1);
+    CHECK_INT(refused, 0);
+    CHECK_TEXT(heard_channel, "left/main/TOOL/0");
+    pal_lcm_link_close(link);
+}
+
+/* a key file that the environment names signs as one that a flag names, and its rights are checked the same */
+static void the_environment_names_the_key(void)
+{
+    static const pal_lcm_events events = {NULL, on_message, on_refused};
+    const palpate_tool_state_t state = a_state();
+    char path[] = "/tmp/test_lcm_keyXXXXXX";
+    int id;
+    pal_diagnostic diag = {""};
+    pal_lcm_link *link = NULL;
+    const int fd = mkstemp(path);
+    REQUIRE(fd >= 0);
+    close(fd);
+    REQUIRE(pal_key_file_add(path, &id, &diag) == PAL_ERR_OK);
+    setenv("PALPATE_LCM_KEY", path, true);
+    chmod(path, 0644);
+    CHECK_INT(pal_lcm_link_open(NULL, &memory, &events, NULL, &diag, &link), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "chmod 600"));
+    chmod(path, 0600);
+    heard = 0;
+    REQUIRE(pal_lcm_link_open(NULL, &memory, &events, NULL, &diag, &link) == PAL_ERR_OK);
+    unsetenv("PALPATE_LCM_KEY");
+    unlink(path);
+    pal_lcm_link_subscribe(link, ".*/TOOL/.*", palpate_tool_state_t_get_type_info());
+    CHECK_INT(pal_lcm_link_publish(link, "main", "TOOL", 0, palpate_tool_state_t_get_type_info(), &state), PAL_ERR_OK);
+    pal_lcm_link_handle(link);
+    CHECK_INT(heard, 1);
+    CHECK(pal_lcm_link_is_keyed(link));
     pal_lcm_link_close(link);
 }
 
@@ -357,13 +421,13 @@ static void on_frame(void *user, const char *channel, const void *bytes, size_t 
 /* one datagram holds 65,507 bytes */
 static void frames_come_whole_whatever_their_size(void)
 {
-    static const pal_lcm_events events = {on_frame, NULL};
+    static const pal_lcm_events events = {NULL, on_frame, NULL};
     static uint8_t payload[1000000];
     const int size[] = {1000, 1000000, 65000, 70000, 0};
     pal_lcm_link *link = NULL;
     for (int i = 0; i < 1000000; i++) payload[i] = (uint8_t)(i % 251);
-    REQUIRE(pal_lcm_link_open(NULL, "memq://", &events, NULL, NULL, &link) == PAL_ERR_OK);
-    pal_lcm_link_subscribe(link, "PALPATE1/.*/BODY/.*", palpate_body_frame_t_get_type_info());
+    REQUIRE(pal_lcm_link_open(NULL, &memory, &events, NULL, NULL, &link) == PAL_ERR_OK);
+    pal_lcm_link_subscribe(link, ".*/BODY/.*", palpate_body_frame_t_get_type_info());
     for (size_t k = 0; k < sizeof size / sizeof *size; k++) {
         const palpate_body_frame_t frame = {.size = size[k], .payload = payload};
         n_byte_heard = 1;
@@ -378,33 +442,41 @@ static void frames_come_whole_whatever_their_size(void)
 static void channels_are_named_and_read_back_exactly(void)
 {
     char channel[PAL_LCM_CHANNEL_MAX + 1];
-    pal_lcm_channel(channel, "main", "HMODEL", 3);
+    pal_lcm_channel(channel, PAL_LCM_PREFIX, "main", "HMODEL", 3);
     CHECK_TEXT(channel, "PALPATE1/main/HMODEL/3");
-    pal_lcm_channel(channel, "main", "STATUS", -1);
+    pal_lcm_channel(channel, PAL_LCM_PREFIX, "main", "STATUS", -1);
     CHECK_TEXT(channel, "PALPATE1/main/STATUS");
-    pal_lcm_channel(channel, "a/b *c\n", "TOOL", 0);
+    pal_lcm_channel(channel, PAL_LCM_PREFIX, "a/b *c\n", "TOOL", 0);
     CHECK_TEXT(channel, "PALPATE1/a_b__c_/TOOL/0");
     char longest[300];
     memset(longest, 'x', sizeof longest - 1);
     longest[sizeof longest - 1] = 0;
-    pal_lcm_channel(channel, longest, "HSTATUS", 31);
+    pal_lcm_channel(channel, PAL_LCM_PREFIX, longest, "HSTATUS", 31);
     CHECK(strlen(channel) <= 63);
-    CHECK_INT(pal_lcm_channel_index(channel, longest, "HSTATUS"), 31);
-    CHECK_INT(pal_lcm_channel_index("PALPATE1/main/TOOL/7", "main", "TOOL"), 7);
-    CHECK_INT(pal_lcm_channel_index("PALPATE1/main/TOOL/07", "main", "TOOL"), -1);
-    CHECK_INT(pal_lcm_channel_index("PALPATE1/main/TOOL/", "main", "TOOL"), -1);
-    CHECK_INT(pal_lcm_channel_index("PALPATE1/other/TOOL/7", "main", "TOOL"), -1);
-    CHECK_INT(pal_lcm_channel_index("PALPATE1/main/TOOL/99999999999", "main", "TOOL"), -1);
+    CHECK_INT(pal_lcm_channel_index(channel, PAL_LCM_PREFIX, longest, "HSTATUS"), 31);
+    CHECK_INT(pal_lcm_channel_index("PALPATE1/main/TOOL/7", PAL_LCM_PREFIX, "main", "TOOL"), 7);
+    CHECK_INT(pal_lcm_channel_index("PALPATE1/main/TOOL/07", PAL_LCM_PREFIX, "main", "TOOL"), -1);
+    CHECK_INT(pal_lcm_channel_index("PALPATE1/main/TOOL/", PAL_LCM_PREFIX, "main", "TOOL"), -1);
+    CHECK_INT(pal_lcm_channel_index("PALPATE1/other/TOOL/7", PAL_LCM_PREFIX, "main", "TOOL"), -1);
+    CHECK_INT(pal_lcm_channel_index("PALPATE1/main/TOOL/99999999999", PAL_LCM_PREFIX, "main", "TOOL"), -1);
 }
 
 static void refuses_addresses_that_are_not_a_bus(void)
 {
-    static const pal_lcm_events events = {on_message, NULL};
+    static const pal_lcm_events events = {NULL, on_message, NULL};
     pal_lcm_link *link = NULL;
     pal_diagnostic diag = {""};
-    CHECK_INT(pal_lcm_link_open(NULL, "tcpq://x", &events, NULL, &diag, &link), PAL_ERR_REFUSED);
+    CHECK_INT(pal_lcm_link_open(NULL, &(pal_lcm_options){.url = "tcpq://x"}, &events, NULL, &diag, &link),
+              PAL_ERR_REFUSED);
     CHECK(strstr(diag.text, "tcpq://x") != NULL);
-    CHECK_INT(pal_lcm_link_open(NULL, "file:///etc/passwd", &events, NULL, &diag, &link), PAL_ERR_REFUSED);
+    CHECK_INT(pal_lcm_link_open(NULL, &(pal_lcm_options){.url = "file:///etc/passwd"}, &events, NULL, &diag, &link),
+              PAL_ERR_REFUSED);
+    const char *prefix[] = {"", "a/b", "thirteen-long", "a*"};
+    for (int i = 0; i < 4; i++) {
+        const pal_lcm_options bad = {.url = "memq://", .prefix = prefix[i]};
+        CHECK_INT(pal_lcm_link_open(NULL, &bad, &events, NULL, &diag, &link), PAL_ERR_REFUSED);
+        CHECK(strstr(diag.text, "1 to 12 letters"));
+    }
 }
 
 int main(void)
@@ -417,6 +489,8 @@ int main(void)
     RUN(pose_survives_the_way_to_lcm_and_back);
     RUN(haptic_model_survives_the_way_to_lcm_and_back);
     RUN(states_of_many_tools_come_through_the_memory_bus);
+    RUN(a_rig_has_channels_of_its_own);
+    RUN(the_environment_names_the_key);
     RUN(frames_come_whole_whatever_their_size);
     RUN(channels_are_named_and_read_back_exactly);
     RUN(refuses_addresses_that_are_not_a_bus);

@@ -41,6 +41,33 @@ check "and palpate-lcm says why" "$(grep -c 'not signed with the key' "$work/ser
 curl -s http://127.0.0.1:8091/sessions >"$work/sessions"
 check "nobody took a tool of the second rig" "$(json free_tools "$work/sessions")" == "$(json tools "$work/sessions")"
 
+check "nor was it concerned by what comes to the first" "$(grep -c 'lcm_refused' "$work/second.err")" == 0
+
+# a third rig has the ball of the first, and a key of its own: its channels have another prefix
+timeout 280 "$bin/palpate" serve "$work/ball.json" --port 8092 --lcm "$bus" --lcm-key "$work/other.keys" --lcm-channel left \
+    --log info --json >"$work/third.out" 2>"$work/third.err" &
+third=$!
+pids="$pids $third"
+shows "$work/third.err" $third lcm_joined
+check "the third rig has joined" $? == 0
+bridge left ball --tool 0 --channel left --lcm-key "$work/other.keys" --until models=60,force_N=0.06
+check "its device feels its ball" $? == 0
+PALPATE_LCM_KEY="$work/other.keys" bridge right ball --tool 0 --seconds 2
+check "and nothing on the channels of the first rig" "$(json models "$work/right")" == 0
+shows "$work/serve.err" $server_job 'TOOL/0: a message is not signed'
+check "whose palpate-lcm refuses that one" $? == 0
+check "but hears nothing of the third rig" "$(grep -c 'lcm_refused.*left' "$work/serve.err")" == 0
+check "and neither is called another palpate-lcm" "$(cat "$work"/serve.err "$work"/third.err | grep -c 'another palpate-lcm')" == 0
+check "the third rig refused nothing" "$(grep -c 'lcm_refused' "$work/third.err")" == 0
+# a fourth one takes the channels of the first
+timeout 60 "$bin/palpate-lcm" --server "ws://127.0.0.1:8091/ws" --lcm "$bus" --session ball --lcm-key "$work/bus.keys" \
+    >/dev/null 2>"$work/fourth.err" &
+fourth=$!
+pids="$pids $fourth"
+shows "$work/serve.err" $server_job 'another palpate-lcm takes the session ball'
+check "two rigs with the same channels are reported" $? == 0
+stop $fourth
+
 # orders
 reply=$("$order" 60 "$bus" ball "$work/bus.keys" configure size=1)
 check "an order on the bus is answered" "$(echo "$reply" | grep -c '^done\|^refused')" == 1

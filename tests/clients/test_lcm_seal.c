@@ -157,7 +157,7 @@ static void a_bus_without_key_takes_what_has_no_seal(void)
     CHECK(!pal_seal_admit(&senders, CHANNEL "1", bytes, &n, NULL, now_ns, now_us, &source));
 }
 
-/* names of channels are the sender's: many of them forget the one that was silent longest, and nothing else */
+/* names of channels are the sender's: many of them replace those whose senders are silent, and nothing else */
 static void many_channels_cost_no_memory(void)
 {
     char channel[64];
@@ -165,7 +165,7 @@ static void many_channels_cost_no_memory(void)
     const sealed mine = seal(7, now_us, NULL);
     CHECK(admit(&mine, CHANNEL, NULL));
     for (int k = 0; k < 1000; k++) {
-        pass_us(1000);
+        pass_us(10000);
         snprintf(channel, sizeof channel, "PALPATE1/x/TOOL/%d", k);
         const sealed other = seal(9, now_us, NULL), again = seal(7, now_us, NULL);
         CHECK(admit(&other, channel, NULL));
@@ -175,6 +175,52 @@ static void many_channels_cost_no_memory(void)
     memset(longest, 'x', sizeof longest - 1);
     longest[sizeof longest - 1] = 0;
     CHECK(!admit(&mine, longest, NULL));
+}
+
+/* made-up channels between two messages of a sender do not take its channel away */
+static void a_flood_of_channels_takes_none(void)
+{
+    char channel[64];
+    begin();
+    const sealed mine = seal(7, now_us, NULL);
+    CHECK(admit(&mine, CHANNEL, NULL));
+    pass_us(1);
+    for (int k = 0; k < 1000; k++) {
+        snprintf(channel, sizeof channel, "PALPATE1/main/TOOL/%d", k + 1);
+        const sealed other = seal(9, now_us, NULL);
+        (void)admit(&other, channel, NULL);
+    }
+    const sealed theirs = seal(9, now_us, NULL), again = seal(7, now_us + 1, NULL);
+    CHECK(!admit(&theirs, CHANNEL, NULL));
+    CHECK(admit(&again, CHANNEL, NULL));
+    snprintf(channel, sizeof channel, "PALPATE1/x/TOOL/0");
+    CHECK(!admit(&theirs, channel, NULL));
+    CHECK_TEXT(why, "too many channels are in use");
+}
+
+/* with a key, a channel is remembered for as long as a message that was sent early could come again */
+static void signed_messages_of_replaced_channels_do_not_come_again(void)
+{
+    char channel[64];
+    begin();
+    sealed early;
+    for (int k = PAL_SEAL_CHANNELS - 1; k >= 0; k--) {
+        pass_us(-1); /* so that the one of `early` is silent longest */
+        snprintf(channel, sizeof channel, "PALPATE1/main/TOOL/%d", k);
+        early = seal(7, now_us + PAL_SEAL_AGE_US - 1, &keys.key[0]);
+        CHECK(
+            pal_seal_put(early.bytes + 100, 7, now_us + PAL_SEAL_AGE_US - 1, channel, early.bytes, 100, &keys.key[0]));
+        CHECK(admit(&early, channel, &keys));
+    }
+    char another[64] = "PALPATE1/main/TOOL/64";
+    for (int step = 0; step < 20; step++) {
+        pass_us(PAL_SEAL_AGE_US / 10);
+        sealed other = seal(7, now_us, NULL);
+        CHECK(pal_seal_put(other.bytes + 100, 7, now_us, another, other.bytes, 100, &keys.key[0]));
+        (void)admit(&other, another, &keys);
+        if (admit(&early, channel, &keys))
+            CHECK_FAIL("it came again after %d ms", (step + 1) * PAL_SEAL_AGE_US / 10000);
+    }
 }
 
 static void numbers_grow_with_the_time(void)
@@ -202,5 +248,7 @@ int main(void)
     RUN(a_bus_without_key_takes_what_has_no_seal);
     RUN(numbers_grow_with_the_time);
     RUN(many_channels_cost_no_memory);
+    RUN(a_flood_of_channels_takes_none);
+    RUN(signed_messages_of_replaced_channels_do_not_come_again);
     return check_report();
 }
