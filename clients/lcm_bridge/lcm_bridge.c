@@ -1,5 +1,6 @@
 #include "clients/lcm_bridge/lcm_bridge.h"
 #include "clients/lcm_bridge/lcm_orders.h"
+#include "clients/lcm_bridge/tuning.h"
 #include "clients/link/asset_store.h"
 #include "clients/link/lcm_convert.h"
 #include "clients/link/lcm_seal.h"
@@ -16,13 +17,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define POSE_RATE_HZ 245.0 /* the server allows 250 */
-#define POSE_BURST   10.0
-#define SILENCE_NS   5000000000u
-#define REPEAT_NS    1000000000u
-#define RESTARTED_NS 1000000000u  /* after this pause a sender without seal may count from the start again */
-#define TRIANGLES_NS 100000000u   /* between two tables of triangles of a part */
-#define OTHER_NS     60000000000u /* between two warnings of another bridge */
+#define STATUS_VERSION 2
+#define POSE_RATE_HZ   245.0 /* the server allows 250 */
+#define POSE_BURST     10.0
+#define SILENCE_NS     5000000000u
+#define REPEAT_NS      1000000000u
+#define RESTARTED_NS   1000000000u  /* after this pause a sender without seal may count from the start again */
+#define TRIANGLES_NS   100000000u   /* between two tables of triangles of a part */
+#define OTHER_NS       60000000000u /* between two warnings of another bridge */
 
 typedef struct bridge_tool {
     pal_lcm_bridge *bridge;
@@ -50,6 +52,7 @@ struct pal_lcm_bridge {
     pal_link *watcher;
     char server[256], session[PAL_WIRE_NAME_BYTES], organ[PAL_WIRE_TEXT_BYTES];
     bool named;
+    pal_wire_role role; /* of the watcher */
     pal_wire_topology topology;
     pal_wire_status status; /* the last one */
     pal_asset_store *store;
@@ -155,7 +158,7 @@ static void bridge_status(pal_lcm_bridge *b, const pal_wire_status *s)
     memcpy(diag, s->diag, sizeof diag);
     const palpate_session_status_t status = {.utime = (int64_t)(pal_clock_ns() / 1000),
                                              .seq = (int32_t)++b->status_seq,
-                                             .version = PAL_LCM_VERSION,
+                                             .version = STATUS_VERSION,
                                              .state = running ? (s->frozen ? 3 : (s->paused ? 2 : 1)) : 0,
                                              .session = b->session,
                                              .organ = b->organ,
@@ -173,6 +176,9 @@ static void bridge_status(pal_lcm_bridge *b, const pal_wire_status *s)
                                              .n_frame_dropped = (int32_t)b->count.n_frame_dropped,
                                              .n_state = (int32_t)b->count.n_state,
                                              .n_state_refused = (int32_t)b->count.n_state_refused,
+                                             .n_order = (int32_t)b->orders.n_order,
+                                             .n_order_refused = (int32_t)b->orders.n_refused,
+                                             .role = running ? (int16_t)b->role : -1,
                                              .n_tool = (int32_t)b->n_tool,
                                              .n_part = (int8_t)n_part,
                                              .epoch = epoch,
@@ -211,10 +217,12 @@ static void watcher_message(void *user, const pal_wire_head *head, const uint8_t
 static void watcher_control(void *user, const pal_control *c)
 {
     pal_lcm_bridge *b = user;
+    pal_lcm_orders_control(&b->orders, c);
     if (c->type == PAL_CONTROL_HELLO) {
         if (!b->named) memcpy(b->session, c->hello.session, sizeof b->session);
         memcpy(b->organ, c->hello.organ, sizeof b->organ);
         b->n_tool = c->hello.n_tool;
+        b->role = c->hello.you_role;
         b->topology.n_part = c->hello.n_part;
         memcpy(b->topology.part, c->hello.part, sizeof b->topology.part);
         for (int i = 0; i < PAL_WIRE_PART_MAX; i++) b->part[i].n_byte = 0;
@@ -363,7 +371,7 @@ static void bridge_lcm_message(void *user, const char *channel, const void *byte
     pal_lcm_bridge *b = user;
     const int index = tool_of(b, channel);
     if (is_channel(b, channel, "ORDER"))
-        pal_lcm_orders_take(&b->orders, bytes, n_byte, source);
+        pal_lcm_orders_take(&b->orders, bytes, n_byte, source, pal_clock_ns());
     else if (is_channel(b, channel, "STATUS"))
         hear_other(b, source);
     else if ((uint32_t)index < b->n_tool)
@@ -423,7 +431,7 @@ pal_err pal_lcm_bridge_open(pal_link_loop *loop, const pal_lcm_bridge_options *o
     for (int i = 0; i < PAL_WIRE_TOOL_MAX; i++) b->tool[i] = (bridge_tool){.bridge = b, .index = i};
     const pal_link_options link = {.url = b->server,
                                    .name = "palpate-lcm",
-                                   .role = PAL_WIRE_ROLE_VIEWER,
+                                   .role = PAL_WIRE_ROLE_INSTRUCTOR,
                                    .tool = PAL_WIRE_TOOL_NONE,
                                    .topology_deltas = true,
                                    .events = &watcher_events,
@@ -433,8 +441,8 @@ pal_err pal_lcm_bridge_open(pal_link_loop *loop, const pal_lcm_bridge_options *o
     if (!err) err = pal_lcm_link_subscribe(b->lcm, ".*/ORDER", palpate_order_t_get_type_info());
     if (!err) err = pal_lcm_link_subscribe(b->lcm, ".*/STATUS", palpate_session_status_t_get_type_info());
     if (!err && !(b->store = pal_asset_store_create(loop, b->server, asset_changed, b))) err = PAL_ERR_MEMORY;
-    b->orders = (pal_lcm_orders){.loop = loop, .lcm = b->lcm, .server = b->server, .session = b->session};
     if (!err) err = pal_link_open(loop, &link, diag, &b->watcher);
+    b->orders = (pal_lcm_orders){.lcm = b->lcm, .session = b->session, .link = b->watcher, .tokens = PAL_ORDERS_BURST};
     if (!err && !pal_link_add_timer(loop, 250000, bridge_tidy, b)) err = PAL_ERR_MEMORY;
     if (err) {
         pal_link_close(b->watcher);

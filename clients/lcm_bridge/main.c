@@ -27,8 +27,10 @@ int main(int argc, char **argv)
         .program = "palpate-lcm",
         .usage = "[flags]",
         .about =
-            "Takes a session to an LCM bus: body frames, status and haptic models out, tool states in, on channels\n"
-            "PREFIX/<session>/...; the types are in lcmtypes/.\n",
+            "Takes a session to an LCM bus: body frames, status and haptic models out, tool states and orders in, on "
+            "channels\n"
+            "PREFIX/<session>/...; the types are in lcmtypes/. Its members have the role and tool of the ticket in\n"
+            "PALPATE_TICKET, or behind the # of the server's URL.\n",
         PAL_FLAGS(flag)};
     const int code = pal_flags_parse(&table, argc, argv, &common, NULL, NULL);
     if (code >= 0) return code;
@@ -50,7 +52,8 @@ int main(int argc, char **argv)
         cJSON *report = PAL_JSON({"frames", JSON_NUMBER(c.n_frame)}, {"frames_dropped", JSON_NUMBER(c.n_frame_dropped)},
                                  {"states", JSON_NUMBER(c.n_state)}, {"states_refused", JSON_NUMBER(c.n_state_refused)},
                                  {"models", JSON_NUMBER(c.n_model)}, {"triangles", JSON_NUMBER(c.n_triangles)},
-                                 {"orders", JSON_NUMBER(c.n_order)}, {"statuses", JSON_NUMBER(c.n_status)});
+                                 {"orders", JSON_NUMBER(c.n_order)}, {"orders_refused", JSON_NUMBER(c.n_order_refused)},
+                                 {"statuses", JSON_NUMBER(c.n_status)});
         (void)pal_json_write(stdout, report);
     }
     const bool refused = !err && pal_lcm_bridge_count(bridge).refused;

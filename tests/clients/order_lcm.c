@@ -1,10 +1,11 @@
 /* Gives an order on the bus, three times as senders do, and prints what the session reports: "done TEXT" or "refused
- * CODE TEXT". With TRIANGLES N it waits for a table of N triangles or more instead, and prints their number. Ends with
- * 1 when nothing comes within S seconds. usage:
- * [CHANNEL=PREFIX] order_lcm S BUS SESSION KEY_FILE|- VERB|TRIANGLES [KEY=VALUE|N]... */
+ * CODE TEXT", or after `pause` "paused by ROLE" from the status. With TRIANGLES N it waits for a table of N triangles
+ * or more instead, and prints their number. Ends with 1 when nothing comes within S seconds. usage: [CHANNEL=PREFIX]
+ * order_lcm S BUS SESSION KEY_FILE|- VERB|TRIANGLES [KEY=VALUE|N]... */
 #include "clients/link/lcm_link.h"
 #include "palpate_answer_t.h"
 #include "palpate_order_t.h"
+#include "palpate_session_status_t.h"
 #include "palpate_triangles_t.h"
 
 #include <stdio.h>
@@ -35,6 +36,13 @@ static void heard(void *user, const char *channel, const void *bytes, size_t n_b
         printf(answer.done ? "done%s %s\n" : "refused %s %s\n", answer.code, answer.text);
         palpate_answer_t_decode_cleanup(&answer);
         n_heard++;
+    } else if (!n_wanted && strstr(channel, "/STATUS") && !strcmp(order.verb, "pause")) {
+        palpate_session_status_t status;
+        if (palpate_session_status_t_decode(bytes, 0, (int)n_byte, &status) < 0) return;
+        n_heard = status.state == 2;
+        if (n_heard) printf("paused by %d\n", status.role);
+        palpate_session_status_t_decode_cleanup(&status);
+        if (!n_heard) return;
     } else {
         return;
     }
@@ -77,6 +85,7 @@ int main(int argc, char **argv)
     const pal_lcm_options bus = {argv[2], getenv("CHANNEL"), strcmp(argv[4], "-") ? argv[4] : NULL};
     if (!err) err = pal_lcm_link_open(loop, &bus, &events, NULL, &diag, &lcm);
     if (!err) err = pal_lcm_link_subscribe(lcm, ".*/ANSWER", palpate_answer_t_get_type_info());
+    if (!err) err = pal_lcm_link_subscribe(lcm, ".*/STATUS", palpate_session_status_t_get_type_info());
     if (!err) err = pal_lcm_link_subscribe(lcm, ".*/TRIANGLES/.*", palpate_triangles_t_get_type_info());
     if (!err && !n_wanted && !pal_link_add_timer(loop, 200000, give, NULL)) err = PAL_ERR_MEMORY;
     if (err) fprintf(stderr, "order_lcm: %s\n", diag.text);

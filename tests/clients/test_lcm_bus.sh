@@ -69,14 +69,26 @@ check "two rigs with the same channels are reported" $? == 0
 stop $fourth
 
 # orders
-reply=$("$order" 60 "$bus" ball "$work/bus.keys" configure size=1)
-check "an order on the bus is answered" "$(echo "$reply" | grep -c '^done\|^refused')" == 1
 reply=$("$order" 60 "$bus" "$sphere" "$work/bus.keys" pause)
-check "a trainee's ticket does not pause" "$(echo "$reply" | grep -c '^refused role')" == 1
-"$order" 5 "$bus" ball - material young_Pa=9000 >/dev/null &
+check "a trainee's ticket does not pause" "$(echo "$reply" | grep -c '^refused role pause: only for')" == 1
+reply=$("$order" 60 "$bus" "$sphere" "$work/bus.keys" nonsense)
+check "a command that nobody knows is refused in words" "$(echo "$reply" | grep -c '^refused verb .*nonsense')" == 1
+# palpate-lcm with an instructor's ticket
+PALPATE_TICKET=$(sed -n 's/.*"instructor":"\([^"]*\)".*/\1/p' "$work/third.out") timeout 100 "$bin/palpate-lcm" --server "ws://127.0.0.1:8092/ws" \
+    --lcm "$bus" --lcm-key "$work/other.keys" --channel front >/dev/null 2>"$work/front.err" &
+pids="$pids $!"
+shows "$work/front.err" $! lcm_joined
+reply=$(CHANNEL=front "$order" 60 "$bus" ball "$work/other.keys" pause)
+check "an instructor's does, and the status has state and role" "$(echo "$reply" | grep -c '^paused by 2')" == 1
+reply=$(CHANNEL=left "$order" 60 "$bus" ball "$work/other.keys" resume)
+check "the trainee's bus of the same session may not resume" "$(echo "$reply" | grep -c '^refused role')" == 1
+"$order" 60 "$bus" ball - pause >"$work/unsigned" 2>&1 &
 unsigned=$!
-wait $unsigned
-check "an order without the key is not heard" $? == 1
+pids="$pids $unsigned"
+shows "$work/serve.err" $server_job 'ball/ORDER: a message is not signed'
+check "an order without the key is refused" $? == 0
+stop $unsigned
+check "and does not reach the session" "$(grep -c ' order: palpate-lcm' "$work/serve.err")" == 0
 
 # triangles of the surface that adapts: those of the asset, then more where it is pulled
 check "a late listener gets the present triangles" "$("$order" 60 "$bus" "$sphere" "$work/bus.keys" TRIANGLES 1)" == 224
