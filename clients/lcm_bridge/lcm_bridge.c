@@ -17,13 +17,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define STATUS_VERSION 2
+#define STATUS_VERSION 2 /* of messages that have changed */
+#define BODY_VERSION   2
 #define POSE_RATE_HZ   245.0 /* the server allows 250 */
 #define POSE_BURST     10.0
 #define SILENCE_NS     5000000000u
 #define REPEAT_NS      1000000000u
 #define RESTARTED_NS   1000000000u  /* after this pause a sender without seal may count from the start again */
-#define TRIANGLES_NS   100000000u   /* between two tables of triangles of a part */
 #define OTHER_NS       60000000000u /* between two warnings of another bridge */
 
 typedef struct bridge_tool {
@@ -40,10 +40,12 @@ typedef struct bridge_part {
     size_t n_byte, cap;
     pal_frame_head head;
     uint64_t sent_ns;
+    bool waits; /* the frame for its triangles */
     /* of a part that adapts */
     pal_triangle_table table; /* n_slot 0: it does not */
     const pal_stored_asset *asset;
-    uint64_t table_sent_ns, table_sent; /* when its triangles were sent, and which change */
+    uint64_t change, table_sent;           /* with which the frame is shown; that was sent, UINT64_MAX: none */
+    uint64_t table_due_ns, table_again_ns; /* when another change, and the same one, may be sent */
 } bridge_part;
 
 struct pal_lcm_bridge {
@@ -68,12 +70,14 @@ static void bridge_body(pal_lcm_bridge *b, uint32_t index)
 {
     bridge_part *part = &b->part[index];
     part->sent_ns = pal_clock_ns();
+    part->waits = false;
     const palpate_body_frame_t frame = {.utime = (int64_t)part->head.sim_time_us,
                                         .epoch = (int32_t)part->head.epoch,
                                         .seq = (int32_t)part->head.seq,
-                                        .version = PAL_LCM_VERSION,
+                                        .version = BODY_VERSION,
                                         .part = (int16_t)index,
                                         .cycle = (int32_t)part->head.cycle,
+                                        .change = (int64_t)part->change,
                                         .size = (int32_t)part->n_byte,
                                         .payload = part->bytes};
     if (pal_lcm_link_publish(b->lcm, b->session, "BODY", (int)index, palpate_body_frame_t_get_type_info(), &frame))
@@ -82,14 +86,13 @@ static void bridge_body(pal_lcm_bridge *b, uint32_t index)
         b->count.n_frame++;
 }
 
-/* the present triangles of a part that adapts, once its asset is there */
+/* the present triangles of a part that adapts, whose asset is there */
 static void bridge_triangles(pal_lcm_bridge *b, uint32_t index)
 {
     bridge_part *part = &b->part[index];
     const pal_triangle_table *table = &part->table;
     const uint32_t n = pal_triangle_table_count(table);
-    if (!table->n_slot || !n) return;
-    int32_t *corner = malloc(sizeof *corner * 3 * n);
+    int32_t *corner = malloc(sizeof *corner * 3 * (n + 1));
     if (!corner) return;
     palpate_triangles_t t = {.utime = (int64_t)(pal_clock_ns() / 1000),
                              .change = (int64_t)table->revision,
@@ -102,10 +105,30 @@ static void bridge_triangles(pal_lcm_bridge *b, uint32_t index)
         if (tri[0] == tri[1]) continue; /* an empty slot */
         for (int k = 0; k < 3; k++) corner[t.n_corner++] = (int32_t)tri[k];
     }
-    part->table_sent = table->revision, part->table_sent_ns = pal_clock_ns();
+    const uint64_t now = pal_clock_ns(), took = (uint64_t)(4e9 * t.n_corner / PAL_TRIANGLES_BYTES_S);
+    part->table_sent = table->revision;
+    part->table_due_ns = now + took;
+    part->table_again_ns = now + (took * PAL_TRIANGLES_REPEAT > REPEAT_NS ? took * PAL_TRIANGLES_REPEAT : REPEAT_NS);
     if (!pal_lcm_link_publish(b->lcm, b->session, "TRIANGLES", (int)index, palpate_triangles_t_get_type_info(), &t))
         b->count.n_triangles++;
     free(corner);
+}
+
+/* the newest frame, behind the triangles that it is shown with; it waits for the asset, or while these have no turn */
+static void bridge_show(pal_lcm_bridge *b, uint32_t index)
+{
+    bridge_part *part = &b->part[index];
+    if (part->n_byte == 0) return;
+    part->waits = true;
+    if (part->table.n_slot) {
+        /* a change stands right before its own frame: the last one is for other triangles */
+        if (!part->table.based || part->change != part->table.revision) return;
+        if (part->table_sent != part->change) {
+            if (pal_clock_ns() < part->table_due_ns) return;
+            bridge_triangles(b, index);
+        }
+    }
+    bridge_body(b, index);
 }
 
 /* the tables begin with the triangles of the assets, which are fetched */
@@ -115,7 +138,8 @@ static void begin_triangles(pal_lcm_bridge *b)
         const pal_wire_part_info *info = &b->topology.part[i];
         bridge_part *part = &b->part[i];
         pal_triangle_table_free(&part->table);
-        part->asset = NULL, part->table_sent = 0;
+        part->asset = NULL, part->waits = false;
+        part->change = part->table_due_ns = 0, part->table_sent = UINT64_MAX;
         if (!info->is_adaptive || pal_triangle_table_init(&part->table, info->n_triangle, info->n_vertex)) continue;
         part->asset = pal_asset_store_request(b->store, info->asset);
         if (part->asset && part->asset->ready) (void)pal_triangle_table_set_base(&part->table, part->asset->asset);
@@ -126,10 +150,14 @@ static void asset_changed(void *user, const pal_stored_asset *asset)
 {
     pal_lcm_bridge *b = user;
     if (asset->failed) pal_log(PAL_LOG_WARN, "asset", "%s: %s", asset->path, asset->reason);
-    for (uint32_t i = 0; i < b->topology.n_part; i++)
-        if (asset->ready && b->part[i].asset == asset && b->part[i].table.n_slot &&
-            !pal_triangle_table_set_base(&b->part[i].table, asset->asset))
-            bridge_triangles(b, i);
+    for (uint32_t i = 0; i < b->topology.n_part; i++) {
+        bridge_part *part = &b->part[i];
+        if (part->asset != asset) continue;
+        /* without its asset a part is shown without triangles */
+        if (!asset->ready || pal_triangle_table_set_base(&part->table, asset->asset))
+            pal_triangle_table_free(&part->table), part->change = 0;
+        if (part->waits) bridge_show(b, i);
+    }
 }
 
 static void take_triangles(pal_lcm_bridge *b, const uint8_t *bytes, size_t n_byte)
@@ -137,8 +165,7 @@ static void take_triangles(pal_lcm_bridge *b, const uint8_t *bytes, size_t n_byt
     pal_topology_delta_head head;
     if (pal_topology_delta_get_head(bytes, n_byte, &head) || head.part >= b->topology.n_part) return;
     bridge_part *part = &b->part[head.part];
-    if (!part->table.n_slot || pal_triangle_table_apply(&part->table, bytes, n_byte, &head)) return;
-    if (pal_clock_ns() - part->table_sent_ns > TRIANGLES_NS) bridge_triangles(b, head.part);
+    if (part->table.n_slot) (void)pal_triangle_table_apply(&part->table, bytes, n_byte, &head);
 }
 
 /* server's status, or NULL when there is no server */
@@ -194,6 +221,7 @@ static void bridge_frame(pal_lcm_bridge *b, const uint8_t *bytes, size_t n_byte)
     pal_frame_head head;
     if (pal_frame_get_head(bytes, n_byte, &head) || head.part >= b->topology.n_part) return;
     bridge_part *part = &b->part[head.part];
+    if (head.epoch != b->topology.part[head.part].epoch) return; /* of the asset before */
     if (n_byte > part->cap) {
         uint8_t *grown = realloc(part->bytes, n_byte);
         if (!grown) return;
@@ -203,7 +231,8 @@ static void bridge_frame(pal_lcm_bridge *b, const uint8_t *bytes, size_t n_byte)
     memcpy(part->bytes, bytes, n_byte);
     part->n_byte = n_byte;
     part->head = head;
-    bridge_body(b, head.part);
+    part->change = part->table.revision;
+    bridge_show(b, head.part);
 }
 
 static void watcher_message(void *user, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
@@ -223,6 +252,7 @@ static void watcher_control(void *user, const pal_control *c)
         memcpy(b->organ, c->hello.organ, sizeof b->organ);
         b->n_tool = c->hello.n_tool;
         b->role = c->hello.you_role;
+        b->status = (pal_wire_status){.step_rate_hz = c->hello.step_rate_hz, .slowdown = 1};
         b->topology.n_part = c->hello.n_part;
         memcpy(b->topology.part, c->hello.part, sizeof b->topology.part);
         for (int i = 0; i < PAL_WIRE_PART_MAX; i++) b->part[i].n_byte = 0;
@@ -232,10 +262,12 @@ static void watcher_control(void *user, const pal_control *c)
     if (c->type == PAL_CONTROL_STATUS) b->status = c->status;
     if (c->type == PAL_CONTROL_TOPOLOGY) {
         b->topology = c->topology;
+        for (int i = 0; i < PAL_WIRE_PART_MAX; i++) b->part[i].n_byte = 0;
         begin_triangles(b);
     }
-    /* a topology too: listeners learn the assets before the first frame of theirs */
-    if (c->type == PAL_CONTROL_STATUS || c->type == PAL_CONTROL_TOPOLOGY) bridge_status(b, &b->status);
+    /* the others too: listeners learn the assets before the first frame of theirs */
+    if (c->type == PAL_CONTROL_STATUS || c->type == PAL_CONTROL_TOPOLOGY || c->type == PAL_CONTROL_HELLO)
+        bridge_status(b, &b->status);
 }
 
 static void watcher_state(void *user, pal_link_state state, int code, const char *reason)
@@ -291,7 +323,6 @@ static void tool_open(pal_lcm_bridge *b, bridge_tool *tool)
                                       .tool = tool->index,
                                       .events = &tool_events,
                                       .user = tool};
-    tool->seq = 0;
     if (pal_link_open(b->loop, &options, NULL, &tool->link)) tool->link = NULL;
     b->count.n_tool += tool->link != NULL;
 }
@@ -387,7 +418,7 @@ static void bridge_lcm_refused(void *user, const char *channel, const char *reas
     b->count.n_state_refused++;
     const bool logged = b->logged_ns && now - b->logged_ns < REPEAT_NS;
     pal_log(logged ? PAL_LOG_DEBUG : PAL_LOG_WARN, "lcm_refused", "%.63s: %s", channel, reason);
-    if (!logged) b->logged_ns = now;
+    if (!logged) b->logged_ns = now, b->count.n_logged++;
 }
 
 /* four times a second: releases tools without states, requests tools that were refused, and repeats parts at rest and
@@ -407,12 +438,15 @@ static void bridge_tidy(void *user)
             pal_link_send_control(tool->link, &(pal_control){.type = PAL_CONTROL_TAKE_TOOL, .tool = i});
         }
     }
-    for (uint32_t i = 0; i < b->topology.n_part; i++)
-        if (b->part[i].table.n_slot &&
-            (b->part[i].table.revision != b->part[i].table_sent || now - b->part[i].table_sent_ns > REPEAT_NS))
+    for (uint32_t i = 0; i < b->topology.n_part; i++) {
+        bridge_part *part = &b->part[i];
+        if (part->n_byte == 0) continue;
+        if (part->waits)
+            bridge_show(b, i);
+        else if (part->table.n_slot && part->table_sent == part->table.revision && now > part->table_again_ns)
             bridge_triangles(b, i);
-    for (uint32_t i = 0; i < b->topology.n_part; i++)
-        if (b->part[i].n_byte > 0 && now - b->part[i].sent_ns > REPEAT_NS) bridge_body(b, i);
+        if (!part->waits && now - part->sent_ns > REPEAT_NS) bridge_body(b, i);
+    }
     if (pal_link_current_state(b->watcher) != PAL_LINK_JOINED && now - b->status_ns > REPEAT_NS && b->session[0])
         bridge_status(b, NULL);
 }

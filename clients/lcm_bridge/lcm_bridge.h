@@ -8,7 +8,9 @@
  *     listener sees a part at rest. Longer than a datagram: in fragments, of which none may be lost, so a listener's
  *     receive buffer must hold the frame.
  *   - STATUS, session_status_t: with every status message of the server, 1 Hz without a server.
- *   - TRIANGLES/<part>, triangles_t: the present triangles of a part that adapts.
+ *   - TRIANGLES/<part>, triangles_t: the present triangles of a part that adapts, before the first frame of theirs: a
+ *     frame waits for its asset, and while more triangles go out than the bus should carry. Repeated as frames are.
+ *     Those of an edited part are in its asset, which STATUS names before the first frame of the new epoch.
  *   - HMODEL/<n>, haptic_model_t.
  *   - ANSWER, answer_t, about orders (lcm_orders.h).
  * In: TOOL/<n>, tool_state_t: length walk, admission (lcm_seal.h), then version, range and finite numbers, a seq that
@@ -28,9 +30,9 @@ typedef struct pal_lcm_bridge_options {
 
 typedef struct pal_lcm_bridge_counts {
     uint64_t n_frame, n_frame_dropped, n_state, n_state_refused, n_model, n_status, n_triangles, n_order,
-        n_order_refused, n_other;
-    int n_tool;   /* with a member now                          */
-    bool refused; /* the server refused for good: the loop was stopped */
+        n_order_refused, n_other, n_logged; /* logged: refusals */
+    int n_tool;                             /* with a member now                          */
+    bool refused;                           /* the server refused for good: the loop was stopped */
 } pal_lcm_bridge_counts;
 
 /* REFUSED: a URL. Borrows loop. */

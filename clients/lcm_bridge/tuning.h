@@ -9,4 +9,9 @@
 /* ns after which a sender without seal may number its orders from the start again: more than its three repeats take
  * (test_lcm_orders) */
 #define PAL_ORDERS_AGAIN_NS 1000000000u
+/* bytes a second of the triangles of a part that adapts: frames wait for theirs, so a table of 60,000 triangles that
+ * changes all the time gets 5 frames a second on a bus of 100 Mbit/s, and one of 1,000 every frame (test_lcm_bridge) */
+#define PAL_TRIANGLES_BYTES_S 4e6
+/* of its time, the share that repeats take while triangles do not change: 1 / this (test_lcm_bridge) */
+#define PAL_TRIANGLES_REPEAT 10
 #endif
