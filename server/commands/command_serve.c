@@ -51,6 +51,8 @@ typedef struct serve_run {
     pal_resume *resume[MAX_SESSIONS];   /* borrowed by the server, as what follows */
     pal_session_study study[MAX_SESSIONS];
     pal_session_recording recording[MAX_SESSIONS];
+    pal_failed_scene failed[MAX_SESSIONS]; /* [n_failed] */
+    int n_failed;
     const char *scenes; /* folder of scenes that are opened while it runs; NULL: none */
     pal_scene_folder folder;
     pal_session_source source;
@@ -120,13 +122,23 @@ static pal_err open_input(serve_run *run, const char *path, pal_diagnostic *diag
     return PAL_ERR_OK;
 }
 
-/* one bad scene stops no other, but a server without a session is none */
+static void note_failed(serve_run *run, const char *input, const pal_diagnostic *diag)
+{
+    pal_failed_scene *failed = &run->failed[run->n_failed++];
+    const char *slash = strrchr(input, '/');
+    snprintf(failed->scene, sizeof failed->scene, "%s", slash && slash[1] ? slash + 1 : input);
+    failed->diag = *diag;
+    pal_log(PAL_LOG_ERROR, "session", "%s is not served: %s", input, diag->text);
+}
+
+/* One bad scene stops no other, but a server without a session is none. Without an input: the folder of scenes alone,
+ * else the computed organ */
 static pal_err open_inputs(serve_run *run, const char *const *input, int n_input, pal_diagnostic *diag)
 {
     run->options.record = run->config.record;
     run->options.record_by_name = n_input > 1 || run->scenes;
     run->options.wake = pal_server_gate_wake, run->options.user = &run->gate;
-    for (int i = 0; i < (n_input ? n_input : 1); i++) {
+    for (int i = 0; i < (n_input || run->scenes ? n_input : 1); i++) {
         pal_diagnostic bad = {""};
         pal_err err = open_input(run, n_input ? input[i] : NULL, &bad);
         if (!err) continue;
@@ -134,7 +146,7 @@ static pal_err open_inputs(serve_run *run, const char *const *input, int n_input
         if (!bad.text[0]) pal_diagnostic_set(&bad, err, "%s", pal_err_text(err));
         *diag = bad;
         if (n_input < 2 || (i == n_input - 1 && run->n == 0)) return err;
-        pal_log(PAL_LOG_ERROR, "session", "%s is not served: %s", input[i], bad.text);
+        note_failed(run, input[i], &bad);
     }
     pal_report_progress(NULL, 0, &run->common);
     /* what is opened later shows no progress at this terminal, and the recording is not of it */
@@ -161,7 +173,9 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
                                   .resume = run->resume,
                                   .study = run->study,
                                   .recording = run->recording,
-                                  .source = run->scenes ? &run->source : NULL};
+                                  .source = run->scenes ? &run->source : NULL,
+                                  .failed = run->failed,
+                                  .n_failed = run->n_failed};
     PAL_TRY(pal_server_open(&options, run->session, run->n, diag, &run->server));
     if (!options.viewer_folder)
         pal_log(PAL_LOG_WARN, "viewer", "no viewer to serve: neither beside the program nor given with --viewer");
@@ -383,7 +397,8 @@ static pal_err run_all(serve_run *run, const char *const *input, int n_input, pa
 static const char about[] =
     "Serves every scene (.json), surface (.obj .stl .ply .off), label volume (.nii .nii.gz .inr .inr.gz) or solid\n"
     "of control cells (.palcells) as a session that browsers, haptic bridges and scripted clients share; without\n"
-    "an input a computed organ. Prints the address to open. Ends on SIGINT, SIGTERM or SIGHUP, or after --seconds.\n";
+    "an input or --scenes a computed organ. Prints the address to open. Ends on SIGINT, SIGTERM or SIGHUP, or after\n"
+    "--seconds.\n";
 
 int command_serve(int argc, char **argv)
 {

@@ -102,10 +102,11 @@ static bool is_scene(const pal_scene_folder *folder, const char *name)
     if (name[0] == '.' || n >= PAL_NAME) return false;
     for (const char *at = name; *at; at++)
         if (!isalnum((unsigned char)*at) && !strchr("._-", *at)) return false;
+    bool is_file = false;
     for (size_t k = 0; k < sizeof ends / sizeof *ends; k++)
-        if (n > strlen(ends[k]) && !strcmp(name + n - strlen(ends[k]), ends[k])) return true;
-    snprintf(path, sizeof path, "%s/%.*s/scene.json", folder->path, PAL_NAME, name);
-    return !stat(path, &info) && S_ISREG(info.st_mode);
+        is_file = is_file || (n > strlen(ends[k]) && !strcmp(name + n - strlen(ends[k]), ends[k]));
+    snprintf(path, sizeof path, "%s/%.*s%s", folder->path, PAL_NAME, name, is_file ? "" : "/scene.json");
+    return !stat(path, &info) && S_ISREG(info.st_mode); /* opening a pipe would wait */
 }
 
 static int compare(const void *a, const void *b)

@@ -3,6 +3,7 @@
 #include "server/net/http_pages.h"
 
 #include "server/base/json_members.h"
+#include "server/base/log.h"
 #include "server/net/hub_rights.h"
 #include "server/net/hub_sessions.h"
 #include "server/net/transport/plain_text.h"
@@ -140,7 +141,7 @@ static void get_sessions(pal_hub *hub, const pal_request *request, pal_reply *re
     }
     const bool instructs = hub->sessions && knows(hub, request, "", PAL_WIRE_ROLE_INSTRUCTOR);
     pal_hub_sessions_openings(hub->sessions, add_opening, &(openings){sessions, instructs});
-    if (instructs) {
+    if (instructs && hub->source) {
         char(*name)[PAL_NAME] = calloc(PAL_SCENES_MAX, sizeof *name);
         cJSON *scenes = cJSON_AddArrayToObject(root, "scenes");
         const int n = name ? pal_hub_sessions_scenes(hub->sessions, name, PAL_SCENES_MAX) : 0;
@@ -152,14 +153,17 @@ static void get_sessions(pal_hub *hub, const pal_request *request, pal_reply *re
 
 static void post(pal_hub *hub, const pal_request *request, pal_reply *reply)
 {
-    char text[400];
-    if (strcmp(request->path, "/sessions") || !hub->sessions) {
-        reply_plain(reply, strcmp(request->path, "/sessions") ? 404 : 405,
-                    "sessions are opened and ended where the server has --scenes\n");
-        return;
-    }
-    const int status = pal_hub_sessions_post(hub->sessions, request, text, sizeof text);
-    reply_json(reply, status, PAL_JSON({status < 300 ? "session" : "error", JSON_TEXT(text)}));
+    char text[400] = "not found", plain[400];
+    int status = 404;
+    if (!strcmp(request->path, "/sessions") && hub->source)
+        status = pal_hub_sessions_post(hub->sessions, request, text, sizeof text);
+    else if (!strcmp(request->path, "/sessions"))
+        status = (snprintf(text, sizeof text, "this server opens and ends no sessions: it has no --scenes"), 405);
+    pal_plain_text(plain, sizeof plain, text);
+    if (status >= 400)
+        pal_log(PAL_LOG_INFO, "refused", "a request from %s: %s",
+                request->address[0] ? request->address : "this process", plain);
+    reply_json(reply, status, PAL_JSON({status < 300 ? "session" : "error", JSON_TEXT(plain)}));
 }
 
 typedef struct metric {
@@ -214,7 +218,8 @@ static size_t print_histograms(const pal_hub *hub, char *text, size_t cap)
 static void get_metrics(pal_hub *hub, const pal_request *request, pal_reply *reply)
 {
     (void)request;
-    static char text[131072]; /* [net] only */
+    /* a line of a histogram is below 120 bytes, all other lines below 16 kB; [net] only */
+    static char text[PAL_SESSIONS_MAX * (PAL_STEP_BOUNDS + 3) * 120 + 16384];
     const pal_hub_count *n = &hub->count;
     double step_s = 0, late = 0, encode_s = 0, n_encode = 0, frame_byte = 0, delta_byte = 0;
     int role[PAL_WIRE_ROLE_COUNT] = {0};
@@ -263,7 +268,7 @@ static void get_metrics(pal_hub *hub, const pal_request *request, pal_reply *rep
         {.label = "reason=\"overflow\"", .value = (double)n->n_overflow},
         {"handshakes_total", "Clients that joined or were turned away.", "result=\"joined\"", (double)n->n_joined},
         {.label = "result=\"refused\"", .value = (double)n->n_refused_join}};
-    const size_t n_histogram = print_histograms(hub, text, sizeof text / 2);
+    const size_t n_histogram = print_histograms(hub, text, sizeof text - 16384);
     print_metrics(rows, rows + sizeof rows / sizeof *rows, text + n_histogram, sizeof text - n_histogram);
     reply_text(reply, 200, "text/plain; version=0.0.4", text, strlen(text));
 }

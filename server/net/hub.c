@@ -384,7 +384,8 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
         room->number = hub->n_numbered++;
         hub->room[hub->n_room++] = room;
     }
-    if (!err && hub->source) err = pal_hub_sessions_create(hub, &hub->sessions);
+    if (!err && (hub->source || options->n_failed)) err = pal_hub_sessions_create(hub, &hub->sessions);
+    for (int k = 0; !err && k < options->n_failed; k++) pal_hub_sessions_fail(hub->sessions, &options->failed[k]);
     if (err) return pal_hub_destroy(hub), err;
     pal_loop_listen(loop, &(pal_loop_events){hub_wake, hub_tick, hub});
     *out = hub;

@@ -27,7 +27,9 @@ typedef struct pal_server_options {
     const pal_session_study *study;         /* [n_session], borrowed until close; NULL: none */
     const pal_session_recording *recording; /* that they play [n_session], copied; NULL: none */
     const pal_session_source *source; /* borrowed until close; NULL: sessions are neither opened nor ended later */
-    const pal_verb *verb;             /* commands that clients may give [n_verb], borrowed; NULL: pal_verb_table */
+    const pal_failed_scene *failed;   /* scenes of the start that could not be opened: listed [n_failed] */
+    int n_failed;
+    const pal_verb *verb; /* commands that clients may give [n_verb], borrowed; NULL: pal_verb_table */
     int n_verb;
 } pal_server_options;
 

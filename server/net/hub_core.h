@@ -35,6 +35,11 @@ typedef struct pal_opened_session {
     pal_resume *resume; /* whose edits are taken; NULL: none */
     void *keep;         /* of the source: lives as long as the session; NULL: nothing */
 } pal_opened_session;
+/* a scene that could not be opened, by the name of its file, and why */
+typedef struct pal_failed_scene {
+    char scene[PAL_NAME];
+    pal_diagnostic diag;
+} pal_failed_scene;
 /* opens sessions while the server runs */
 typedef struct pal_session_source {
     void *user;
@@ -192,10 +197,10 @@ typedef struct pal_verb pal_verb;
 
 struct pal_hub {
     pal_loop *loop;
-    const pal_session_source *source; /* NULL: no sessions are opened or ended while it runs */
-    struct pal_hub_sessions *sessions;
-    bool open;            /* whoever comes is what it asks to be */
-    const pal_verb *verb; /* known commands [n_verb], borrowed */
+    const pal_session_source *source;  /* NULL: no sessions are opened or ended while it runs */
+    struct pal_hub_sessions *sessions; /* NULL: nor did one fail at the start */
+    bool open;                         /* whoever comes is what it asks to be */
+    const pal_verb *verb;              /* known commands [n_verb], borrowed */
     int n_verb;
     double error_m;
     pal_site *site;

@@ -6,6 +6,7 @@
 #include "server/net/hub_jobs.h"
 #include "server/net/hub_peers.h"
 #include "server/net/hub_rights.h"
+#include "server/net/transport/plain_text.h"
 #include "server/net/tuning.h"
 
 #include <pthread.h>
@@ -58,7 +59,7 @@ typedef struct opening {
     char name[PAL_NAME], scene[PAL_NAME];
     enum { NONE, WAITS, UNDER_WAY, FAILED } state;
     char why_not[sizeof((pal_diagnostic *)0)->text];
-    uint64_t failed_ns;
+    uint64_t until_ns; /* that it has failed is listed */
 } opening;
 
 struct pal_hub_sessions {
@@ -178,9 +179,9 @@ static void finish(pal_hub_sessions *s, opening *o, pal_hub_room *made, const ch
         return;
     }
     o->state = FAILED;
-    o->failed_ns = pal_loop_now_ns(hub->loop);
-    snprintf(o->why_not, sizeof o->why_not, "%s", why_not);
-    pal_log(PAL_LOG_WARN, "session", "%s cannot be opened: %s", o->name, why_not);
+    o->until_ns = pal_loop_now_ns(hub->loop) + PAL_FAILED_NS;
+    pal_plain_text(o->why_not, sizeof o->why_not, why_not);
+    pal_log(PAL_LOG_WARN, "session", "%s cannot be opened: %s", o->name, o->why_not);
 }
 
 void pal_hub_sessions_update(pal_hub_sessions *s)
@@ -195,7 +196,7 @@ void pal_hub_sessions_update(pal_hub_sessions *s)
     pthread_mutex_unlock(&s->lock);
     for (opening *o = s->opening; o < s->opening + PAL_OPENINGS_MAX; o++) {
         if (done && o->state == UNDER_WAY) finish(s, o, made, diag.text);
-        if (o->state == FAILED && now > o->failed_ns + PAL_FAILED_NS) *o = (opening){.state = NONE};
+        if (o->state == FAILED && now > o->until_ns) *o = (opening){.state = NONE};
     }
     submit(s);
 }
@@ -212,9 +213,29 @@ static pal_hub_room *find_room(const pal_hub *hub, const char *name)
 static bool is_taken(const pal_hub_sessions *s, const char *name)
 {
     for (int k = 0; k < PAL_OPENINGS_MAX; k++)
-        if (s->opening[k].state != NONE && s->opening[k].state != FAILED && !strcmp(s->opening[k].name, name))
-            return true;
+        if (s->opening[k].state != NONE && !strcmp(s->opening[k].name, name)) return true;
     return find_room(s->hub, name) != NULL;
+}
+
+/* "liver.json" becomes "liver", then "liver-2" */
+static void choose_name(const pal_hub_sessions *s, const char *scene, char name[PAL_NAME])
+{
+    const int n_base = (int)strcspn(scene, ".") < PAL_NAME - 8 ? (int)strcspn(scene, ".") : PAL_NAME - 8;
+    snprintf(name, PAL_NAME, "%.*s", n_base, scene);
+    for (int k = 2; is_taken(s, name); k++) snprintf(name, PAL_NAME, "%.*s-%d", n_base, scene, k % 100000);
+}
+
+void pal_hub_sessions_fail(pal_hub_sessions *s, const pal_failed_scene *failed)
+{
+    opening *o = s->opening;
+    char name[PAL_NAME];
+    while (o < s->opening + PAL_OPENINGS_MAX && o->state != NONE) o++;
+    if (o == s->opening + PAL_OPENINGS_MAX) return;
+    choose_name(s, failed->scene, name);
+    *o = (opening){.state = FAILED, .until_ns = UINT64_MAX};
+    snprintf(o->name, sizeof o->name, "%s", name);
+    pal_plain_text(o->scene, sizeof o->scene, failed->scene);
+    pal_plain_text(o->why_not, sizeof o->why_not, failed->diag.text);
 }
 
 static bool is_scene(const pal_hub_sessions *s, const char *scene)
@@ -227,12 +248,13 @@ static bool is_scene(const pal_hub_sessions *s, const char *scene)
     return found;
 }
 
-static int open_scene(pal_hub_sessions *s, const char *scene, char *text, size_t cap)
+static int open_scene(pal_hub_sessions *s, const char *scene, const char *address, char *text, size_t cap)
 {
     opening *free_one = NULL;
     char name[PAL_NAME];
     int n_busy = 0;
     for (opening *o = s->opening; o < s->opening + PAL_OPENINGS_MAX; o++) {
+        if (o->state == FAILED && !strcmp(o->scene, scene)) *o = (opening){.state = NONE}; /* it is tried again */
         n_busy += o->state == WAITS || o->state == UNDER_WAY;
         if (o->state == NONE || (o->state == FAILED && (!free_one || free_one->state == FAILED))) free_one = o;
     }
@@ -241,18 +263,16 @@ static int open_scene(pal_hub_sessions *s, const char *scene, char *text, size_t
         return snprintf(text, cap, "there are %d sessions, and no room for more: end one", s->hub->n_room + n_busy),
                409;
     if (!free_one || !need_thread(s)) return snprintf(text, cap, "%d scenes are being opened: wait", n_busy), 429;
-    /* "liver.json" becomes "liver", then "liver-2" */
-    const int n_base = (int)strcspn(scene, ".") < PAL_NAME - 8 ? (int)strcspn(scene, ".") : PAL_NAME - 8;
-    snprintf(name, sizeof name, "%.*s", n_base, scene);
-    for (int k = 2; is_taken(s, name); k++) snprintf(name, sizeof name, "%.*s-%d", n_base, scene, k % 100000);
+    choose_name(s, scene, name);
     *free_one = (opening){.state = WAITS};
     snprintf(free_one->name, sizeof free_one->name, "%s", name);
     snprintf(free_one->scene, sizeof free_one->scene, "%s", scene);
+    pal_log(PAL_LOG_INFO, "session", "%s is being opened for an instructor from %s", name, address);
     submit(s);
     return snprintf(text, cap, "%s", name), 202;
 }
 
-static int end_session(pal_hub_sessions *s, const char *name, char *text, size_t cap)
+static int end_session(pal_hub_sessions *s, const char *name, const char *address, char *text, size_t cap)
 {
     pal_hub *hub = s->hub;
     pal_hub_room *room = find_room(hub, name);
@@ -268,7 +288,7 @@ static int end_session(pal_hub_sessions *s, const char *name, char *text, size_t
     memmove(&hub->room[r], &hub->room[r + 1], sizeof *hub->room * (size_t)(--hub->n_room - r));
     if (room->given) *room->given = NULL, room->own = true;
     room->given = NULL;
-    pal_log(PAL_LOG_INFO, "session", "%s was ended by an instructor", name);
+    pal_log(PAL_LOG_INFO, "session", "%s was ended by an instructor from %s", name, address);
     pthread_mutex_lock(&s->lock);
     room->next_closing = s->closing;
     s->closing = room;
@@ -293,6 +313,7 @@ int pal_hub_sessions_post(pal_hub_sessions *s, const pal_request *request, char 
 {
     cJSON *json = cJSON_ParseWithLength(request->body, request->n_body);
     const cJSON *one = cJSON_IsObject(json) ? json->child : NULL;
+    const char *from = request->address[0] ? request->address : "this process";
     const bool opens = one && !strcmp(one->string, "open"), ends = one && !strcmp(one->string, "end");
     int status;
     if (!(opens || ends) || one->next || !cJSON_IsString(one) || !one->valuestring[0] ||
@@ -300,8 +321,8 @@ int pal_hub_sessions_post(pal_hub_sessions *s, const pal_request *request, char 
         status = (snprintf(text, cap, "wanted {\"open\": SCENE} or {\"end\": SESSION}"), 422);
     else if ((status = check_right(s->hub, request, opens ? "" : one->valuestring, text, cap)) == 200)
         status = s->hub->leaving ? (snprintf(text, cap, "the server ends"), 503)
-                 : opens         ? open_scene(s, one->valuestring, text, cap)
-                                 : end_session(s, one->valuestring, text, cap);
+                 : opens         ? open_scene(s, one->valuestring, from, text, cap)
+                                 : end_session(s, one->valuestring, from, text, cap);
     cJSON_Delete(json);
     return status;
 }

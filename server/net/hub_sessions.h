@@ -11,8 +11,10 @@ typedef struct pal_hub_sessions pal_hub_sessions;
 /* a session as a room, with its stream; takes what a resumed session borrows. room->own is to be set. [any] */
 pal_err pal_hub_room_open(pal_hub *hub, const pal_opened_session *opened, pal_diagnostic *diag, pal_hub_room **out);
 void pal_hub_room_close(pal_hub_room *room); /* no client is in it; NULL is fine. [any] */
-/* NULL: the hub's source gives nothing; allocates, starts no thread. [load] */
+/* allocates, starts no thread. [load] */
 pal_err pal_hub_sessions_create(pal_hub *hub, pal_hub_sessions **out);
+/* lists a scene of the start that could not be opened, until it is opened or another one needs its place. [load] */
+void pal_hub_sessions_fail(pal_hub_sessions *sessions, const pal_failed_scene *failed);
 void pal_hub_sessions_destroy(pal_hub_sessions *sessions); /* waits for what is under way; NULL is fine. [load] */
 void pal_hub_sessions_update(pal_hub_sessions *sessions);  /* what has been opened becomes a room */
 /* {"open": SCENE} or {"end": SESSION} of a POST; fills *text with one sentence, and returns the HTTP status */

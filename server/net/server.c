@@ -97,7 +97,7 @@ static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_
     const int max_socket = s->address.max_socket = (options->max_clients > 0 ? options->max_clients : PAL_HUB_CLIENTS) +
                                                    PAL_UNJOINED_PLACES + 128 + PAL_HEALTH_SOCKETS;
     PAL_TRY(pal_loop_create(s->ops->sockets, max_socket, options->tls_certificate != NULL,
-                            pal_session_clock(session[0]), diag, &s->loop));
+                            n_session ? pal_session_clock(session[0]) : &pal_clock_monotonic, diag, &s->loop));
     PAL_TRY(pal_hub_create(s->loop, options, s->site, session, n_session, diag, &s->hub));
     pal_hub_events(s->hub, &events);
     return s->ops->open(s->loop, &s->address, &events, diag, &s->transport);
@@ -106,7 +106,7 @@ static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_
 pal_err pal_server_open(const pal_server_options *options, pal_session **session, int n_session, pal_diagnostic *diag,
                         pal_server **out)
 {
-    if (n_session < 1) return PAL_REFUSE(diag, "a server needs a session");
+    if (n_session < 1 && !options->source) return PAL_REFUSE(diag, "a server needs a session");
     pal_server *s = calloc(1, sizeof *s);
     if (!s) return PAL_ERR_MEMORY;
     s->ops = options->transport ? options->transport : &pal_ws_transport;

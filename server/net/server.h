@@ -9,7 +9,7 @@
 typedef struct pal_server pal_server;
 
 /* REFUSED: the address needs allow_remote, or the port is in use (the diagnostic names it). Borrows sessions until
- * close. [load] */
+ * close. n_session may be 0 where a source opens others, with websockets. [load] */
 pal_err pal_server_open(const pal_server_options *options, pal_session **session, int n_session, pal_diagnostic *diag,
                         pal_server **out);
 /* The wake callback of sessions; user: a zeroed pal_server_gate. It exists before the sessions, because they start

@@ -38,14 +38,16 @@ END
 mkdir "$work/viewer"
 echo '<p>page' >"$work/viewer/index.html"
 
-get() { # get PATH: status and body
-    node -e 'fetch(process.argv[1]).then(async r => console.log(r.status, (await r.text()).slice(0, 200)),
-        e => console.log("no answer", String(e)))' "http://127.0.0.1:$port$1"
+get() { # get PATH [BODY]: status and body; with BODY a POST
+    node -e 'const [url, body] = process.argv.slice(1);
+        fetch(url, body ? { method: "POST", body, headers: { "Content-Type": "application/json" } } : {}).then(
+            async r => console.log(r.status, (await r.text()).slice(0, 800)),
+            e => console.log("no answer", String(e)))' "http://127.0.0.1:$port$1" ${2+"$2"}
 }
 serve() { # serve ARGUMENTS...: starts the server; its output comes through descriptor 3
     rm -f "$work/pipe"
     mkfifo "$work/pipe"
-    "$palpate" serve "$work/cube.obj" --port 0 --viewer "$work/viewer" "$@" >"$work/pipe" 2>"$work/log" &
+    "$palpate" serve --port 0 --viewer "$work/viewer" "$@" >"$work/pipe" 2>"$work/log" &
     pid=$!
     exec 3<"$work/pipe"
 }
@@ -76,7 +78,7 @@ one_line() { # one_line CODE WORD ARGUMENTS...: exit code, exactly one line on s
     [ $? -eq "$want" ] && [ "$(wc -l <"$work/err")" -eq 1 ] && grep -q -- "$word" "$work/err"
 }
 
-serve --units mm --resolution 5 --json
+serve "$work/cube.obj" --units mm --resolution 5 --json
 check "says where it is in one JSON line" waits_for "$work/json" '"port"'
 port=$(sed 's/.*"port": *\([0-9]*\).*/\1/' "$work/json")
 check "tells its own pid" grep -q "\"pid\": *$pid[,}]" "$work/json"
@@ -92,15 +94,41 @@ check "ends on SIGTERM with 0" ends_with_0 TERM "$work/json"
 check "has said nothing else" [ "$(wc -l <"$work/json")" -eq 1 ]
 pid=
 
-serve --units mm --resolution 5 --json
+serve "$work/cube.obj" --units mm --resolution 5 --json
 check "opens again" waits_for "$work/again" '"port"'
 check "ends on SIGTERM to a thread of a library with 0" ends_with_0 TERM "$work/again" "$(signal_taker)"
 pid=
 
-serve --resolution 5
+serve "$work/cube.obj" --resolution 5
 check "names the address to open" waits_for "$work/plain" 'palpate: open http://127.0.0.1:'
 check "ends on SIGINT with 0" ends_with_0 INT "$work/plain"
 check "states the unit it guessed" grep -q 'unit mm .*guessed' "$work/plain"
+pid=
+
+serve "$work/nothing.obj" "$work/cube.obj" --resolution 5 --open --json
+check "serves one scene beside one that is missing" waits_for "$work/two" '"port"'
+port=$(sed 's/.*"port": *\([0-9]*\).*/\1/' "$work/two")
+get /sessions >"$work/list"
+check "lists the session" grep -q '"name":"cube"' "$work/list"
+check "and the one that failed, with the reason" grep -q '"name":"nothing",.*"state":"failed","text":".*nothing.obj' "$work/list"
+check "opens none without a folder" [ "$(get /sessions '{"open":"cube.obj"}' | cut -c 1-3)" = 405 ]
+check "ends with 0" ends_with_0 TERM "$work/two"
+check "says so in its log, with the time in UTC" grep -Eq '^[0-9-]{10}T[0-9:]{8}\.[0-9]{3}Z error session: .*nothing.obj is not served' "$work/log"
+pid=
+check "does not start when all scenes are missing" one_line 1 nothing.obj --port 0 "$work/nothing.obj"
+
+mkdir "$work/scenes"
+cp "$work/cube.obj" "$work/scenes"
+serve --scenes "$work/scenes" --resolution 5 --open --json
+check "starts with nothing but a folder of scenes" waits_for "$work/none" '"port"'
+port=$(sed 's/.*"port": *\([0-9]*\).*/\1/' "$work/none")
+check "lists no session, and the scene" [ "$(get /sessions)" = '200 {"sessions":[],"scenes":["cube.obj"]}' ]
+check "is healthy without a session" [ "$(get /healthz)" = "200 ok" ]
+check "opens a scene" [ "$(get /sessions '{"open":"cube.obj"}')" = '202 {"session":"cube"}' ]
+check "opens none outside of the folder" [ "$(get /sessions '{"open":"../cube.obj"}' | cut -c 1-3)" = 404 ]
+check "ends with 0 while it is opened" ends_with_0 TERM "$work/none"
+check "logs who asked" grep -q 'Z info session: cube is being opened for an instructor from 127.0.0.1' "$work/log"
+check "logs what was refused" grep -q 'Z info refused: a request from 127.0.0.1: there is no scene ../cube.obj' "$work/log"
 pid=
 
 echo "$passed passed, $failed failed"

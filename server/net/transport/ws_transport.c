@@ -188,6 +188,19 @@ static int send_reply(struct lws *wsi, request *r, pal_reply *reply, const char 
     return 0;
 }
 
+/* of a POST, whose body is not read: the socket closes. One sentence, as the hub answers */
+static int deny_post(struct lws *wsi, int status, const char *host, const char *sentence)
+{
+    char text[128];
+    const int n = snprintf(text, sizeof text, "{\"error\":\"%s\"}\n", sentence);
+    const pal_reply reply = {.status = status, .type = "application/json", .caching = "no-store"};
+    unsigned char buffer[LWS_PRE + sizeof text];
+    memcpy(buffer + LWS_PRE, text, (size_t)n);
+    if (!write_headers(wsi, &reply, host, (size_t)n))
+        (void)lws_write(wsi, buffer + LWS_PRE, (size_t)n, LWS_WRITE_HTTP_FINAL);
+    return -1;
+}
+
 /* The body of a POST is to follow. A page of another site cannot send one: its Origin is not this host, and JSON it may
  * not send unasked */
 static int begin_post(struct lws *wsi, request *r, const char *path)
@@ -195,13 +208,15 @@ static int begin_post(struct lws *wsi, request *r, const char *path)
     char type[64] = "", length[64] = "";
     lws_set_timer_usecs(wsi, PAL_SOCKET_DEADLINE_US);
     if (!host_allowed(wsi, r->host, sizeof r->host)) return deny_host(wsi);
-    if (!origin_allowed(wsi, r->host)) return deny(wsi, 403);
+    if (!origin_allowed(wsi, r->host)) return deny_post(wsi, 403, r->host, "a page of another site may not ask this");
     (void)lws_hdr_copy(wsi, type, sizeof type, WSI_TOKEN_HTTP_CONTENT_TYPE);
-    if (strncasecmp(type, "application/json", 16)) return deny(wsi, 415);
-    if (lws_hdr_copy(wsi, length, sizeof length, WSI_TOKEN_HTTP_CONTENT_LENGTH) <= 0) return deny(wsi, 411);
-    if (strlen(length) > 8 || atol(length) < 1 || atol(length) >= PAL_POST_MAX) return deny(wsi, 413);
+    if (strncasecmp(type, "application/json", 16)) return deny_post(wsi, 415, r->host, "wanted application/json");
+    if (lws_hdr_copy(wsi, length, sizeof length, WSI_TOKEN_HTTP_CONTENT_LENGTH) <= 0)
+        return deny_post(wsi, 411, r->host, "the length of the body is missing");
+    if (strlen(length) > 8 || atol(length) < 1 || atol(length) >= PAL_POST_MAX)
+        return deny_post(wsi, 413, r->host, "the body is empty or too long");
     if (strlen(path) >= sizeof r->path) return deny(wsi, 414);
-    if (!bearer_of(wsi, r->ticket)) return deny(wsi, 401);
+    if (!bearer_of(wsi, r->ticket)) return deny_post(wsi, 401, r->host, "this is not a ticket");
     lws_get_peer_simple(wsi, r->address, sizeof r->address);
     strcpy(r->path, path);
     r->n_posted = 0;
@@ -257,7 +272,8 @@ static int request_came(struct lws *wsi, request *r, const char *path)
     lws_get_peer_simple(wsi, address, sizeof address);
     const uint64_t wait_ns = pal_request_rate_take(&t->rate, address, pal_clock_ns());
     const bool posts = lws_hdr_total_length(wsi, WSI_TOKEN_POST_URI) > 0;
-    if (wait_ns == UINT64_MAX || (posts && wait_ns > 0)) return deny(wsi, 429);
+    if (posts && wait_ns > 0) return deny_post(wsi, 429, "", "too many requests: wait a moment");
+    if (wait_ns == UINT64_MAX) return deny(wsi, 429);
     if (posts) return begin_post(wsi, r, path);
     if (wait_ns == 0) return begin_reply(wsi, r, path);
     if (strlen(path) >= sizeof r->path) return deny(wsi, 414);
