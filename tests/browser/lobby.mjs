@@ -3,7 +3,19 @@
 import { execFileSync } from "node:child_process";
 import { writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { check, checkConsoles, launch, palpate, pictures, prepare, run, scratch, serve, until } from "./common.mjs";
+import {
+    check,
+    checkConsoles,
+    launch,
+    nextFrame,
+    palpate,
+    pictures,
+    prepare,
+    run,
+    scratch,
+    serve,
+    until,
+} from "./common.mjs";
 
 const cards = (page) =>
     page.evaluate(() =>
@@ -74,7 +86,11 @@ await run(async () => {
         () => drawn(ada, "chair"),
         (s) => s > 0.05,
     );
-    await ada.screenshot({ path: join(pictures, "lobby_instructor.png") });
+    for (const colorScheme of ["light", "dark"]) {
+        await ada.emulateMedia({ colorScheme });
+        await ada.screenshot({ path: join(pictures, `lobby_${colorScheme}.png`) });
+    }
+    await ada.emulateMedia({ colorScheme: "light" });
 
     const eve = await page("", "Eve", { width: 390, height: 780 });
     await eve.waitForSelector("#lobby-sessions li");
@@ -94,7 +110,8 @@ await run(async () => {
         () => window.palpate.state.hello.you.role + " " + window.palpate.state.hello.session,
     );
     check("a link leads into it, with the ticket", you === "instructor chair", you);
-    await ada.waitForFunction(() => window.palpate.state.bodies.size > 0);
+    await ada.waitForFunction(() => [...window.palpate.state.bodies.values()].some((body) => body.shown));
+    await nextFrame(ada);
     check("and back", await ada.locator("#lobby-link").isVisible());
     await ada.screenshot({ path: join(pictures, "lobby_joined.png") });
     const zoe = await page("trainee", "Zoe", { width: 900, height: 640 });
@@ -114,7 +131,7 @@ await run(async () => {
         () => zoe.textContent("#state-text"),
         (text) => text.includes("ended"),
     );
-    check("who was in it is text", text === "there is no such session: the session was ended by an instructor", text);
+    check("who was in it is told", text === "the session was ended by an instructor", text);
     const alive = await tim.evaluate(() => window.palpate.state.status.sim_time_s);
     const later = await until(
         () => tim.evaluate(() => window.palpate.state.status.sim_time_s),

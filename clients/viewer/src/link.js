@@ -21,6 +21,7 @@ const FIGURES_MS = 500;
 const LATENCY_MAX_MS = 10000; // a larger value comes from the clock of another connection
 const SPARE_MAX = 4; // pairs of arrays that wait for reuse
 const CLOSE_FULL = 4003; // for now: tried again
+const CLOSE_NO_SESSION = 4004; // or it has ended
 const CLOSE_UNREADABLE = 4900; // close code: the server sent what this page cannot read
 
 /** close codes after which reconnection is useless, with the text for the user */
@@ -29,7 +30,7 @@ const FINAL = new Map([
     [1008, "access denied"],
     [1009, "the server rejected a message of this page"],
     [4001, "this page sent too many messages"],
-    [4004, "there is no such session"],
+    [CLOSE_NO_SESSION, "there is no such session"],
     [4005, "you cannot take part any more"],
 ]);
 
@@ -183,7 +184,9 @@ export class Link {
             this.socket = null;
             const text = FINAL.get(event.code);
             if (text) {
-                this.report("refused", event.reason ? `${text}: ${event.reason}` : text);
+                // the reason of a session that is over says everything
+                const { code, reason } = event;
+                this.report("refused", (code === CLOSE_NO_SESSION ? reason : reason && `${text}: ${reason}`) || text);
                 return;
             }
             const pause = Math.min(RETRY_MAX_MS, RETRY_MS * 2 ** this.tries++);

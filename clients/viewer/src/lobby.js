@@ -15,8 +15,11 @@ const SLOW = 1.05; // slowdown that still counts as real time
  * @typedef {{sessions: Session[], scenes?: string[]}} List scenes: of those who may open them
  */
 
-/** is there anything to choose? @param {List} list */
-export const offersChoice = (list) => list.sessions.length !== 1 || list.scenes !== undefined;
+/** is there anything to choose, or a reason to read why a scene failed? @param {List} list */
+export const offersChoice = ({ sessions, scenes }) =>
+    sessions.filter(({ state }) => state !== "failed").length !== 1 ||
+    scenes !== undefined ||
+    sessions.some(({ text }) => text);
 
 /** @param {Session} session @returns {string} */
 export function stateText({ state, slowdown = 1, text }) {

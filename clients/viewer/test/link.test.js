@@ -292,6 +292,16 @@ test("says why and stays away after a refusal", () => {
     /** @type {any} */ (s.sockets[0]).onclose({ code: 4005, reason: "Bo has removed you" });
     assert.equal(s.waiting.length, 0);
     assert.match(s.of("state").at(-1).text, /cannot take part.*Bo has removed you/);
+    // a session that is over is the whole reason
+    for (const [reason, text] of [
+        ["the session was ended by an instructor", "the session was ended by an instructor"],
+        ["", "there is no such session"],
+    ]) {
+        s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee", ticket: "" });
+        /** @type {any} */ (s.sockets.at(-1)).onclose({ code: 4004, reason });
+        assert.equal(s.of("state").at(-1).text, text);
+        assert.equal(s.waiting.length, 0);
+    }
 });
 
 test("a server that does not answer is told within 1.5 s, with the seconds, and that it answers again", async () => {

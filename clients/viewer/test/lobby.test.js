@@ -12,6 +12,10 @@ test("one session is opened at once, unless scenes can be opened", () => {
     assert.equal(offersChoice({ sessions: [session({})], scenes: [] }), true);
     assert.equal(offersChoice({ sessions: [] }), true);
     assert.equal(offersChoice({ sessions: [session({}), session({})] }), true);
+    // one that failed is none, but who may know the reason reads it
+    assert.equal(offersChoice({ sessions: [session({}), session({ state: "failed" })] }), false);
+    assert.equal(offersChoice({ sessions: [session({}), session({ state: "failed", text: "no mesh" })] }), true);
+    assert.equal(offersChoice({ sessions: [session({ state: "failed" })] }), true);
 });
 
 test("states are said in words", () => {
