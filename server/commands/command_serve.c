@@ -327,7 +327,7 @@ static uint64_t restart_lcm(serve_run *run)
     for (int i = 0; i < run->n; i++) {
         lcm_child *child = &run->lcm[i];
         uint64_t due_ns = child->start_ns ? child->start_ns + PAL_LCM_RESTART_NS : 0;
-        if (!child->server[0] || child->pid) continue;
+        if (!child->server[0] || child->pid || pal_server_has_ended(run->server, i)) continue;
         if (due_ns <= pal_clock_ns())
             start_lcm(run, child);
         else if (due_ns < next_ns)

@@ -427,6 +427,11 @@ void pal_hub_start_ticket(const pal_hub *hub, pal_wire_role role, char text[PAL_
     pal_admission_start_ticket(hub->admission, role, text);
 }
 
+bool pal_hub_has_ended(const pal_hub *hub, int i)
+{
+    return hub->ended >> i & 1;
+}
+
 int pal_hub_record_error(const pal_hub *hub)
 {
     int error = 0;

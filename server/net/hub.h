@@ -45,4 +45,5 @@ void pal_hub_goodbye(pal_hub *hub);                      /* drops every peer wit
 void pal_hub_start_ticket(const pal_hub *hub, pal_wire_role role, char text[PAL_TICKET_TEXT]);
 int pal_hub_record_error(const pal_hub *hub); /* errno of a recording that has ended; 0: none */
 int pal_hub_clients(const pal_hub *hub);
+bool pal_hub_has_ended(const pal_hub *hub, int i); /* was session i of those that it was given ended? [any] */
 #endif

@@ -206,7 +206,8 @@ struct pal_hub {
     pal_site *site;
     pal_admission *admission;
     int n_room, n_numbered, max_members, max_clients,
-        n_client; /* max_clients: members and those who have not joined yet */
+        n_client;           /* max_clients: members and those who have not joined yet */
+    _Atomic uint64_t ended; /* bit i: session i of those that it was given was ended by an instructor */
     bool leaving;
     uint32_t started_s;                   /* Unix time */
     bool health_on_main;                  /* health and metrics are served beside the rest */

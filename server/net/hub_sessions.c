@@ -284,6 +284,7 @@ static int end_session(pal_hub_sessions *s, const char *name, const char *addres
         pal_hub_drop(c, PAL_WIRE_CLOSE_NO_SESSION, "the session was ended by an instructor");
         c->room = NULL;
     }
+    if (room->number < PAL_SESSIONS_MAX) hub->ended |= UINT64_C(1) << room->number;
     while (hub->room[r] != room) r++;
     memmove(&hub->room[r], &hub->room[r + 1], sizeof *hub->room * (size_t)(--hub->n_room - r));
     if (room->given) *room->given = NULL, room->own = true;

@@ -142,6 +142,11 @@ int pal_server_record_error(const pal_server *server)
     return pal_hub_record_error(server->hub);
 }
 
+bool pal_server_has_ended(const pal_server *server, int i)
+{
+    return pal_hub_has_ended(server->hub, i);
+}
+
 int pal_server_port(const pal_server *server)
 {
     return server->address.port;

@@ -5,6 +5,7 @@
 #include "tests/check.h"
 
 #include <dirent.h>
+#include <malloc.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -66,10 +67,14 @@ static int count(const char *path)
 static void a_good_one_is_a_session_of_the_name_and_leaves_nothing(void)
 {
     int threads = 0, files = 0;
+    size_t bytes = 0;
     for (int k = 0; k < CHECK_REPEATS(40, 6); k++) {
         pal_diagnostic diag = {""};
         pal_opened_session opened = {.session = NULL};
-        if (k == 3) threads = count("/proc/self/task"), files = count("/proc/self/fd");
+        if (k == 3) {
+            threads = count("/proc/self/task"), files = count("/proc/self/fd");
+            bytes = mallinfo2().uordblks;
+        }
         if (source.open(source.user, "cube.obj", "cube-7", &diag, &opened)) CHECK_FAIL("%s", diag.text);
         REQUIRE(opened.session && opened.keep);
         CHECK_TEXT(pal_session_scene(opened.session)->name, "cube-7");
@@ -78,6 +83,7 @@ static void a_good_one_is_a_session_of_the_name_and_leaves_nothing(void)
     }
     CHECK_INT(count("/proc/self/task"), threads);
     CHECK_INT(count("/proc/self/fd"), files);
+    CHECK_LE(mallinfo2().uordblks, bytes + 100000); /* what the allocator keeps for threads settles below */
 }
 
 int main(void)

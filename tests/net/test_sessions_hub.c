@@ -119,7 +119,9 @@ static void instructors_open_and_end(void)
     CHECK(!listed("", "clay-3") && listed("", "clay-2"));
     CHECK_INT(ask("", "{\"end\":\"clay-3\"}"), 404);
     /* the one that the server was started with too; those that are left go on */
+    CHECK(!pal_server_has_ended(server, 0));
     CHECK_INT(ask("", "{\"end\":\"clay\"}"), 200);
+    CHECK(pal_server_has_ended(server, 0) && !pal_server_has_ended(server, 1));
     CHECK_INT(pal_mem_code(a.peer), PAL_WIRE_CLOSE_NO_SESSION);
     CHECK(!session);
     CHECK_INT(ask("", "{\"open\":\"clay.json\"}"), 202);
