@@ -1,1 +1,2 @@
 pal_fuzz(hub LINK pal_net)
+pal_fuzz(sessions LINK pal_net)
