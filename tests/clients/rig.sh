@@ -65,10 +65,11 @@ SCENE
     scene=$work/block.json
 }
 
-# start_server [flags]: serves $scene, the ball when it is not set; sets $server_pid, $port, $url
+# start_server [flags]: serves $scene, the ball when it is not set, to everybody unless $admission is empty; sets
+# $server_pid, $port, $url
 start_server() {
     : >"$work/serve.out"
-    timeout 280 "$bin/palpate" serve "${scene:-$work/ball.json}" --open --json "$@" >"$work/serve.out" 2>"$work/serve.err" &
+    timeout 280 "$bin/palpate" serve "${scene:-$work/ball.json}" ${admission---open} --json "$@" >"$work/serve.out" 2>"$work/serve.err" &
     pids="$pids $!"
     server_job=$!
     if ! shows "$work/serve.out" $server_job '"port"'; then

@@ -11,8 +11,12 @@ fi
 openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -keyout "$work/key" -out "$work/cert" -days 2 -subj /CN=organ.test \
     -addext "subjectAltName=DNS:organ.test" 2>"$work/openssl.log"
 cat "$work/cert" "$work/key" >"$work/all.pem"
-start_server --port 0 --allow-remote --hosts organ.test
+mkdir "$work/scenes"
+cp "$work/ball.json" "$work/ball.obj" "$work/scenes"
+admission=
+start_server --port 0 --allow-remote --hosts organ.test --scenes "$work/scenes"
 first=$port
+ticket=$(sed -n 's/.*"instructor": *"\([^"]*\)".*/\1/p' "$work/serve.out")
 sed 's/"name": *"ball"/"name": "second"/' "$work/ball.json" >"$work/second.json"
 scene=$work/second.json
 start_server --port 0 --allow-remote --hosts organ.test
@@ -33,6 +37,15 @@ ask() { # ask ARGUMENTS...: the status of an answer through HAProxy
 site=https://organ.test:$https
 check "the list of sessions comes" "$(ask "$site/sessions")" == 200
 check "and is the first server's" "$(grep -c '"ball"' "$work/body")" == 1
+check "without a ticket, it names no scenes" "$(grep -c scenes "$work/body")" == 0
+ask -H "Authorization: Bearer $ticket" "$site/sessions" >/dev/null
+check "with an instructor's, it does" "$(grep -c '"scenes":\["ball.json","ball.obj"\]' "$work/body")" == 1
+order() { # order ARGUMENTS...: the status of opening a scene
+    ask -H 'Content-Type: application/json' -d '{"open":"ball.json"}' "$@" "$site/sessions"
+}
+check "who has a ticket opens one" "$(order -H "Authorization: Bearer $ticket" -H "Origin: https://organ.test:$https")" == 202
+check "who has none does not" "$(order)" == 401
+check "nor does another site" "$(order -H "Authorization: Bearer $ticket" -H 'Origin: https://evil.test')" == 403
 check "metrics stay inside" "$(ask "$site/metrics")" == 404
 check "a foreign name" "$(ask -H 'Host: evil.test' "$site/sessions")" == 403
 check "an upgrade to HTTP/2" "$(ask -H 'Connection: Upgrade, HTTP2-Settings' -H 'Upgrade: h2c' -H 'HTTP2-Settings: AAMAAABk' "$site/")" == 400
