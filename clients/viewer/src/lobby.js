@@ -194,6 +194,7 @@ export class Lobby {
     /** @param {string[] | undefined} scenes */
     showScenes(scenes) {
         htmlById("lobby-open", this.page).hidden = !scenes;
+        htmlById("lobby-no-scenes", this.page).hidden = scenes?.length !== 0;
         const list = htmlById("lobby-scenes", this.page);
         const key = scenes?.join("\n") ?? "";
         if (list.dataset.shown === key) return;
