@@ -1,0 +1,50 @@
+// Every text that the page shows, in the language of the user. The languages are files of the same keys; English is
+// complete, and a test compares the others with it. The address chooses (?lang=de), else the browser.
+import { ENGLISH } from "./text_en.js";
+import { GERMAN } from "./text_de.js";
+
+/** @typedef {keyof typeof ENGLISH} TextKey */
+
+/** @type {Record<string, Record<TextKey, string>>} */
+export const LANGUAGES = { en: ENGLISH, de: GERMAN };
+
+/**
+ * The first known language of a list, by their first subtag ("de-AT" is "de").
+ * @param {readonly (string | null | undefined)[]} preferred @returns {string}
+ */
+export function chooseLanguage(preferred) {
+    for (const tag of preferred) {
+        const language = (tag ?? "").toLowerCase().split("-")[0];
+        if (Object.hasOwn(LANGUAGES, language)) return language;
+    }
+    return "en";
+}
+
+const asked = typeof location === "undefined" ? null : new URLSearchParams(location.search).get("lang");
+export const language = chooseLanguage([asked, ...(typeof document === "undefined" ? [] : navigator.languages)]);
+
+/**
+ * The text of a key; {name} in it is replaced by values.name.
+ * @param {TextKey} key @param {Record<string, string | number>} [values]
+ */
+export function text(key, values = {}) {
+    return LANGUAGES[language][key].replace(/\{(\w+)\}/g, (all, name) => String(values[name] ?? all));
+}
+
+/** is there a text of this key? @param {string} key @returns {key is TextKey} */
+export const isTextKey = (key) => Object.hasOwn(ENGLISH, key);
+
+/**
+ * Texts of the elements of a page: data-text is the key of its text, data-title of its tooltip, data-label of its
+ * name for screen readers.
+ * @param {Document} page
+ */
+export function fillTexts(page) {
+    page.documentElement.lang = language;
+    for (const element of /** @type {NodeListOf<HTMLElement>} */ (page.querySelectorAll("[data-text]")))
+        element.textContent = text(/** @type {TextKey} */ (element.dataset.text));
+    for (const element of /** @type {NodeListOf<HTMLElement>} */ (page.querySelectorAll("[data-title]")))
+        element.title = text(/** @type {TextKey} */ (element.dataset.title));
+    for (const element of /** @type {NodeListOf<HTMLElement>} */ (page.querySelectorAll("[data-label]")))
+        element.ariaLabel = text(/** @type {TextKey} */ (element.dataset.label));
+}
