@@ -12,11 +12,15 @@ types)
     # the served vendor folder does not exist in the tree: its types stand in for it, beside the sources by rootDirs
     mkdir -p "$packages/types/vendor"
     echo 'export * from "three";' >"$packages/types/vendor/three.module.min.d.ts"
+    while read -r addon; do
+        mkdir -p "$packages/types/vendor/addons/${addon%/*}"
+        echo "export * from \"three/addons/$addon\";" >"$packages/types/vendor/addons/${addon%.js}.d.ts"
+    done <"$tree/clients/viewer/addons.txt"
     cat >"$packages/tsconfig.json" <<JSON
 {
   "extends": "$tree/clients/viewer/jsconfig.json",
   "compilerOptions": { "rootDirs": ["$tree/clients/viewer", "$packages/types"], "typeRoots": ["$packages/node_modules/@types"], "types": [] },
-  "include": ["$tree/clients/viewer/src/*.js", "$packages/types/vendor/*.d.ts"]
+  "include": ["$tree/clients/viewer/src/*.js", "$packages/types/vendor/**/*.d.ts"]
 }
 JSON
     exec "$packages/node_modules/.bin/tsc" --noEmit -p "$packages/tsconfig.json"
