@@ -1,6 +1,7 @@
 /* A recording for a debrief: an input log in memory that plays from any moment, for any number of sessions. A seek
  * costs the edits before the moment, without their worlds, one world, and the steps since the last state in the log: at
- * most 0.7 s of processor time by PAL_STATE_WORK_NS. Thread: [any], also several at a time. */
+ * most 0.7 s of processor time by PAL_STATE_WORK_NS, and as much for each grasp that is held then. Thread: [any], also
+ * several at a time. */
 #ifndef PAL_SESSION_RECORDING_H
 #define PAL_SESSION_RECORDING_H
 #include "server/session/resume.h"

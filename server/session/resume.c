@@ -73,25 +73,100 @@ static pal_err step_until(pal_resume *resume, pal_replayed *r, uint64_t step, pa
     return PAL_ERR_OK;
 }
 
-/* the world after `last` steps, or at the end of the record: stepped from the last state on, or from rest */
-static pal_err step_on(pal_resume *resume, pal_replayed *r, uint64_t last, pal_diagnostic *diag)
+/* Steps after which each tool closed on the tissue that it holds in a state, in order, and how many: a component that
+ * is reset or made again closes anew. n: bytes before the state */
+static int find_grasps(const pal_resume *resume, size_t n, uint64_t closed[PAL_TOOL_MAX])
 {
     pal_input_record record;
-    resume->at = find_state(resume, last);
-    bool first = resume->at > 0;
-    if (resume->at > 0) PAL_TRY(change_all(resume, resume->at, r, diag));
-    if (resume->at == 0) resume->at = PAL_INPUT_HEADER;
+    bool held[PAL_TOOL_MAX] = {false};
+    uint64_t since[PAL_TOOL_MAX] = {0};
+    for (size_t at = PAL_INPUT_HEADER; at < n;) {
+        if (get(resume, &at, &record, NULL)) break;
+        const bool pose = record.kind == PAL_INPUT_POSE, grasp = pose && (record.pose.buttons & 1);
+        if (pose || record.kind == PAL_INPUT_RELEASE) {
+            if (grasp && !held[record.index]) since[record.index] = record.step;
+            held[record.index] = grasp;
+        }
+        for (int t = 0; t < PAL_TOOL_MAX; t++) {
+            held[t] = held[t] && record.kind != PAL_INPUT_RESET;
+            if (record.kind == PAL_INPUT_RESET_BODY || record.kind == PAL_INPUT_COMPONENT) since[t] = record.step;
+        }
+    }
+    int n_closed = 0;
+    for (int t = 0; t < PAL_TOOL_MAX; t++) {
+        int k = n_closed;
+        if (!held[t]) continue;
+        for (; k > 0 && closed[k - 1] > since[t]; k--) closed[k] = closed[k - 1];
+        closed[k] = since[t];
+        n_closed++;
+    }
+    return n_closed;
+}
+
+static bool takes_effect(const pal_input_record *record)
+{
+    return record->kind != PAL_INPUT_HASH && record->kind != PAL_INPUT_END;
+}
+
+/* to the state that begins at `to`: what was input before it takes effect, without steps */
+static pal_err jump(pal_resume *resume, pal_replayed *r, size_t to, pal_diagnostic *diag)
+{
+    pal_input_record record;
+    if (to <= resume->at) return PAL_ERR_OK;
+    if (!r->world) {
+        PAL_TRY(change_all(resume, resume->at = to, r, diag));
+        PAL_TRY(pal_replayed_need_world(r, diag));
+        r->changes_alone = false;
+    }
+    for (size_t at = resume->at; at < to; resume->at = at) {
+        PAL_TRY(get(resume, &at, &record, diag));
+        if (takes_effect(&record) && record.kind != PAL_INPUT_STATE) PAL_TRY(pal_replayed_apply(r, &record, diag));
+    }
+    pal_world_place_tools(r->world);
+    PAL_TRY(get(resume, &to, &record, diag));
+    resume->step = record.step;
+    return PAL_ERR_OK;
+}
+
+/* before the first record, unless the world is further already */
+static pal_err begin_at_rest(pal_resume *resume, pal_replayed *r, pal_diagnostic *diag)
+{
+    if (resume->at > 0) return PAL_ERR_OK;
+    resume->at = PAL_INPUT_HEADER;
     PAL_TRY(pal_replayed_need_world(r, diag));
     r->changes_alone = false;
+    return PAL_ERR_OK;
+}
+
+static pal_err take_records(pal_resume *resume, pal_replayed *r, uint64_t last, pal_diagnostic *diag)
+{
+    pal_input_record record;
     for (size_t at = resume->at; at < resume->n_byte; resume->at = at) {
         PAL_TRY(get(resume, &at, &record, diag));
         if (record.step > last) break;
-        if (first) resume->step = record.step, first = false;
         PAL_TRY(step_until(resume, r, record.step, diag));
-        if (record.kind != PAL_INPUT_HASH && record.kind != PAL_INPUT_END)
-            PAL_TRY(pal_replayed_apply(r, &record, diag));
+        if (takes_effect(&record)) PAL_TRY(pal_replayed_apply(r, &record, diag));
     }
-    if (last != UINT64_MAX) PAL_TRY(step_until(resume, r, last, diag));
+    return last == UINT64_MAX ? PAL_ERR_OK : step_until(resume, r, last, diag);
+}
+
+/* The world after `last` steps, or at the end of the record: stepped from the last state on, or from rest. A state has
+ * positions and velocities only. What tools hold in it they hold as they closed: each closing is stepped from the
+ * state before it, and the time between is left out */
+static pal_err step_on(pal_resume *resume, pal_replayed *r, uint64_t last, pal_diagnostic *diag)
+{
+    uint64_t closed[PAL_TOOL_MAX];
+    const size_t state = find_state(resume, last);
+    const int n_closed = find_grasps(resume, state, closed);
+    resume->at = 0;
+    for (int k = 0; k < n_closed; k++) {
+        PAL_TRY(jump(resume, r, closed[k] ? find_state(resume, closed[k] - 1) : 0, diag));
+        PAL_TRY(begin_at_rest(resume, r, diag));
+        PAL_TRY(take_records(resume, r, closed[k] + 1, diag));
+    }
+    PAL_TRY(jump(resume, r, state, diag));
+    PAL_TRY(begin_at_rest(resume, r, diag));
+    PAL_TRY(take_records(resume, r, last, diag));
     resume->time_s = pal_world_time_s(r->world);
     return PAL_ERR_OK;
 }

@@ -1,8 +1,8 @@
 /* Goes on from a moment of a recording: from its end, after kill -9, a power cut or an orderly end (palpate serve
  * --resume), or from any moment (recording.h). The world is that of the scene as edits and switches have left it, with
  * its materials and disabled components, in the last state that the recording holds before the moment, and the input
- * after that is stepped again. Undo and redo of edits survive. What begins anew is what components keep between
- * steps: grasps, brushes, friction. Thread: [any], one at a time. */
+ * after that is stepped again. Grasps that were held close again where they closed. Undo and redo of edits survive.
+ * What begins anew is what other components keep between steps: brushes, friction. Thread: [any], one at a time. */
 #ifndef PAL_SESSION_RESUME_H
 #define PAL_SESSION_RESUME_H
 #include "server/session/configuration_switch.h"
@@ -14,8 +14,8 @@ typedef struct pal_resume pal_resume;
  * pal_resume_free. *out NULL: there is no recording. REFUSED: not a recording, or of another scene */
 pal_err pal_resume_open(const char *path, const pal_scene *scene, pal_diagnostic *diag, pal_resume **out);
 /* From the moment after `step` steps of a recording that was checked (log_check.h). Borrows name, bytes and scene until
- * pal_resume_free. records: the session's own record will begin here, so that its replay is equal; else it is made
- * sooner, and what tools hold since the last state, they hold still. Errors of pal_world_create */
+ * pal_resume_free. records: the session's own record will begin here, so that its replay is equal, and no tool holds
+ * anything; else it is made sooner, and tools hold what they held. Errors of pal_world_create */
 pal_err pal_resume_at(const char *name, const uint8_t *bytes, size_t n_byte, const pal_scene *scene, uint64_t step,
                       bool records, pal_diagnostic *diag, pal_resume **out);
 /* after the session; what was taken stays */

@@ -92,8 +92,7 @@ static bool keep_state(void *user, const pal_world *world, double fraction)
     return false; /* enough */
 }
 
-/* a seek leads to what an exact replay shows there: grasps and friction begin anew at the last state, hence 2 % of the
- * size */
+/* a seek leads to what an exact replay shows there: friction begins anew at the last state, hence 2 % of the size */
 static void a_seek_shows_what_was(void)
 {
     static state_at exact;

@@ -53,6 +53,15 @@ void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose, double dt_s)
     find_omega(tool, dt_s);
 }
 
+void pal_tool_place(pal_tool *tool, const pal_pose *pose)
+{
+    tool->present = pose != NULL;
+    tool->ramp = tool->present;
+    if (!pose) return;
+    tool->requested = tool->last = *pose;
+    memcpy(tool->here_m, pose->position_m, sizeof tool->here_m);
+}
+
 void pal_tools_begin_substep(pal_tools *tools, int sub, int n_sub, double dt_s)
 {
     for (int t = 0; t < tools->n_tool; t++) {

@@ -72,6 +72,8 @@ bool pal_pose_ok(const pal_pose *pose, double limit_m);
 /* before a step: takes the requested pose (NULL: released) and updates the ramp; a tool that appears does not sweep its
  * path */
 void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose, double dt_s);
+/* between steps: it has been at the pose for long, with its whole force; NULL: it has been away */
+void pal_tool_place(pal_tool *tool, const pal_pose *pose);
 /* before sub-step `sub` of `n_sub`: sets here_m and velocity, clears the force */
 void pal_tools_begin_substep(pal_tools *tools, int sub, int n_sub, double dt_s);
 /* after the step: mean force, last = requested */

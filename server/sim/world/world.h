@@ -32,6 +32,9 @@ void pal_world_destroy(pal_world *world);  /* [load] */
 /* Requests a pose, which the tool reaches at the end of the next step; NULL: releases it. REFUSED (state unchanged):
  * not finite, farther than 100 body sizes away, no such tool. [sim] */
 pal_err pal_world_pose(pal_world *world, int tool, const pal_pose *pose);
+/* Every tool has been at its requested pose for long: for a world that takes the state of another. Call between steps.
+ * [sim] */
+void pal_world_place_tools(pal_world *world);
 /* Advances by dt_s, split into sub-steps. REFUSED: dt_s is not a positive number. BUDGET: the step needs more than
  * scene->max_substep sub-steps even at rest with an adaptive body at its finest level. Both leave the world
  * unchanged. FROZEN: a body diverged in this step and was frozen (body.reason). The error of a component that failed is

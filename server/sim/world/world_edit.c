@@ -20,6 +20,12 @@ pal_err pal_world_pose(pal_world *world, int tool, const pal_pose *pose)
     return PAL_ERR_OK;
 }
 
+void pal_world_place_tools(pal_world *world)
+{
+    for (int t = 0; t < world->tools.n_tool; t++)
+        pal_tool_place(&world->tools.tool[t], world->has_requested_pose[t] ? &world->requested_pose[t] : NULL);
+}
+
 /* resets one body to rest, its components as at load */
 static void rest_body(pal_world *w, int b)
 {
