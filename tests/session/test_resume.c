@@ -74,7 +74,7 @@ static void record(void)
 
 static void what_tools_hold_is_held_as_it_was(void)
 {
-    for (int step = 20; step <= STEPS; step += 19)
+    for (int step = 20; step <= STEPS; step += 37)
         for (int records = 0; records < 2; records++) {
             pal_diagnostic diag = {""};
             pal_resume *resume = NULL;
