@@ -120,7 +120,7 @@ const extents = (page) =>
             dirty: stage.dirty,
         };
     });
-const flip = (page, name) => page.click(`#components input[aria-label="Component ${name}"]`);
+const flip = (page, name) => page.click(`#components tr[title^="${name}"] input`);
 
 /** the report of the study: the button of a row copies the command that writes the scene of this row */
 async function pressRow(browser, file) {
@@ -266,7 +266,7 @@ await run(async () => {
         );
         check(
             `${what} runs, and the effects of the switch are displayed`,
-            /^Switched: energy [+−][\d.]+ %/.test(after.message) &&
+            /^Switched in [\d.]+ m?s, surface moved/.test(after.message) &&
                 after.estimate?.study_point === after.front[position],
             `${after.message} ${after.configuration}`,
         );
@@ -354,10 +354,8 @@ await run(async () => {
             `${before.configuration} -> ${after.configuration}; ${title}`,
         );
         check(
-            "the displacement of the switch is displayed with its bound",
-            /^Switched: energy [+−][\d.]+ %, surface moves .* \(bound .*\), .* per frame, prepared in/.test(
-                after.message,
-            ),
+            "how far the surface moved is displayed",
+            /^Switched in [\d.]+ m?s, surface moved .* mm\.$/.test(after.message),
             after.message,
         );
     }
@@ -408,7 +406,7 @@ await run(async () => {
     );
     check("the second browser shows that it is disabled", seenOff.off.length === 1, seenOff.off.join());
     await ada.screenshot({ path: join(pictures, "accuracy_component_off.png") });
-    await until(() => ada.isEnabled(`#components input[aria-label="Component ${name}"]`));
+    await until(() => ada.isEnabled(`#components tr[title^="${name}"] input`));
     await flip(ada, name);
     const on = await until(
         () => plan(ada),

@@ -1,6 +1,7 @@
 // Draws the plot of error against cost as SVG: axes, the study's points and its Pareto front, the running configuration.
 import { layOutPlot } from "./accuracy_plot.js";
 import { milliseconds, millimetres, plainLabel, pointText } from "./accuracy_text.js";
+import { text as textOf } from "./text.js";
 
 const BOX = { left: 40, right: 302, top: 20, bottom: 172 };
 const SVG = "http://www.w3.org/2000/svg";
@@ -33,11 +34,11 @@ function drawAxes(plot) {
             shape("line", { x1: left, x2: right, y1: at, y2: at, class: "grid" }),
             shape("text", { x: left - 5, y: at + 3.5, class: "tick", "text-anchor": "end" }, text),
         ]),
-        shape("text", { x: right, y: bottom + 28, class: "tick", "text-anchor": "end" }, "ms per step"),
+        shape("text", { x: right, y: bottom + 28, class: "tick", "text-anchor": "end" }, textOf("accuracy.axis.cost")),
         shape(
             "text",
             { x: 2, y: top - 9, class: "tick" },
-            plot.studied ? "largest error under the study's loads, mm" : "largest error now, mm",
+            textOf(plot.studied ? "accuracy.axis.study" : "accuracy.axis.now"),
         ),
     ];
 }
@@ -48,7 +49,7 @@ function drawLimits(plot, { stepMs, reference }) {
     const out = [];
     if (stepMs > plot.msRange.low && stepMs < plot.msRange.high) {
         const x = plot.x(stepMs);
-        const text = `${milliseconds(stepMs)} per step is real time: configurations to the right are slower`;
+        const text = textOf("accuracy.real_time.tip", { ms: milliseconds(stepMs) });
         out.push(shape("line", { x1: x, x2: x, y1: top, y2: bottom, class: "limit" }, text));
         // beside the line, where there is room
         const isLeft = x < (left + right) / 2;
@@ -58,13 +59,13 @@ function drawLimits(plot, { stepMs, reference }) {
             class: "limit-name",
             "text-anchor": isLeft ? "start" : "end",
         };
-        out.push(shape("text", at, "real time"));
+        out.push(shape("text", at, textOf("state.real_time")));
     }
     if (reference !== undefined && 1e3 * reference > plot.errorRange.low && 1e3 * reference < plot.errorRange.high) {
         const y = plot.y(reference);
-        const text = `${millimetres(reference)} is the error of the reference: smaller errors cannot be distinguished`;
+        const text = textOf("accuracy.reference.tip", { mm: millimetres(reference) });
         out.push(shape("line", { x1: left, x2: right, y1: y, y2: y, class: "limit" }, text));
-        out.push(shape("text", { x: left + 3, y: y - 3, class: "limit-name" }, "error of the reference"));
+        out.push(shape("text", { x: left + 3, y: y - 3, class: "limit-name" }, textOf("accuracy.reference")));
     }
     return out;
 }
@@ -86,7 +87,11 @@ function drawPoints(plot, { requested }) {
             shape("circle", { cx: plot.x(requested.cost_ms), cy: plot.y(requested.error_m), r: 8, class: "requested" }),
         );
     for (const { x, y, of } of plot.neighbours) {
-        const text = `${plainLabel(of.label)}, predicted: ${milliseconds(of.cost_ms)}, ${millimetres(of.error_m)}`;
+        const text = textOf("accuracy.predicted", {
+            name: plainLabel(of.label),
+            ms: milliseconds(of.cost_ms),
+            mm: millimetres(of.error_m),
+        });
         out.push(shape("path", { d: `M${x} ${y - 5}l5 5l-5 5l-5 -5z`, class: "neighbour" }, text));
     }
     return out;
@@ -99,15 +104,15 @@ function drawLive({ live }) {
     if (live.y === null)
         return [
             shape("line", { x1: live.x, x2: live.x, y1: top, y2: bottom, class: "live-line" }),
-            shape("text", { x: live.x + 4, y: top + 9, class: "now" }, "now"),
+            shape("text", { x: live.x + 4, y: top + 9, class: "now" }, textOf("accuracy.mark_now")),
         ];
     // the label stands above or below: neighbours in time step and tolerance lie to the left and right
     const y = live.y + (live.y > top + 24 ? -13 : 22);
     const x = Math.min(Math.max(live.x, left + 14), right - 14);
     return [
         shape("circle", { cx: live.x, cy: live.y, r: 9, class: "live-ring" }),
-        shape("circle", { cx: live.x, cy: live.y, r: 4.5, class: "live" }, "now"),
-        shape("text", { x, y, class: "now", "text-anchor": "middle" }, "now"),
+        shape("circle", { cx: live.x, cy: live.y, r: 4.5, class: "live" }, textOf("accuracy.mark_now")),
+        shape("text", { x, y, class: "now", "text-anchor": "middle" }, textOf("accuracy.mark_now")),
     ];
 }
 

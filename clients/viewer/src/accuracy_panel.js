@@ -14,6 +14,7 @@ import {
     switchText,
 } from "./accuracy_text.js";
 import { htmlById, inputById, makeOption, selectById } from "./dom.js";
+import { text as textOf } from "./text.js";
 
 /**
  * @typedef {import("./control_table.js").Estimate} Estimate
@@ -109,7 +110,7 @@ export class AccuracyPanel {
         this.front = frontOf(this.points);
         this.slider.max = String(Math.max(0, this.front.length - 1));
         this.at("front").hidden = this.front.length < 2;
-        if (this.points.length === 0) this.report("No accuracy study exists for this scene.");
+        if (this.points.length === 0) this.report(textOf("accuracy.no_study"));
         this.show();
     }
 
@@ -149,7 +150,7 @@ export class AccuracyPanel {
     submit(command, label) {
         if (this.pending) return;
         this.pending = { command, since: Date.now() };
-        this.report(`Preparing ${plainLabel(label)} …`);
+        this.report(textOf("accuracy.preparing", { name: plainLabel(label) }));
         this.send(command);
         this.show();
     }
@@ -205,7 +206,9 @@ export class AccuracyPanel {
         this.at("error").classList.toggle("old", text.age !== "");
         this.at("bar").classList.toggle("old", text.age !== "");
         this.at("note").textContent = text.note;
-        this.at("parts").replaceChildren(...parts.map((p) => this.legendItem(p.colour, p.title, millimetres(p.value))));
+        this.at("parts").replaceChildren(
+            ...parts.map((p) => this.legendItem(p.colour, textOf(p.title), millimetres(p.value))),
+        );
         const segments = parts.filter((part) => part.share > SHARE_MIN);
         this.at("bar").hidden = segments.length === 0;
         this.at("bar").replaceChildren(
@@ -250,7 +253,11 @@ export class AccuracyPanel {
         const title = Object.assign(this.page.createElement("b"), { textContent: near.parameter });
         const text = Object.assign(this.page.createElement("span"), { textContent: neighbourText(estimate, near) });
         button.append(title, text);
-        button.title = `${plainLabel(near.label)}, predicted: ${milliseconds(near.cost_ms)}, ${millimetres(near.error_m)}`;
+        button.title = textOf("accuracy.predicted", {
+            name: plainLabel(near.label),
+            ms: milliseconds(near.cost_ms),
+            mm: millimetres(near.error_m),
+        });
         button.disabled = this.pending !== null || !command;
         if (command) button.onclick = () => this.submit(command, near.label);
         return button;

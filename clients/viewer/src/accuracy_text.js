@@ -1,4 +1,5 @@
 // Estimates of the error in words: lengths, times, alternatives, what a switch did. Pure.
+import { text as textOf } from "./text.js";
 
 /**
  * @typedef {import("./control_table.js").Estimate} Estimate
@@ -15,10 +16,10 @@ const SAME_MS = 0.005; // half the last digit of a displayed time
 /** parts of the error, in the order of the stacked bar */
 export const PARTS = Object.freeze(
     /** @type {const} */ ([
-        { key: "discretisation_m", title: "mesh", colour: "#5cb8ff" },
-        { key: "algebraic_m", title: "solver", colour: "#62d39a" },
-        { key: "time_m", title: "step", colour: "#ffb45c" },
-        { key: "model_m", title: "model", colour: "#e08bd8" },
+        { key: "discretisation_m", title: "accuracy.part.mesh", colour: "#5cb8ff" },
+        { key: "algebraic_m", title: "accuracy.part.solver", colour: "#62d39a" },
+        { key: "time_m", title: "accuracy.part.step", colour: "#ffb45c" },
+        { key: "model_m", title: "accuracy.part.model", colour: "#e08bd8" },
     ]),
 );
 
@@ -40,7 +41,7 @@ export function short(v) {
 
 /** @param {number | undefined} m */
 export function millimetres(m) {
-    if (m === undefined) return "unknown";
+    if (m === undefined) return textOf("accuracy.unknown");
     return m !== 0 && m < RESOLUTION_M ? "< 0.001 mm" : `${short(1e3 * m)} mm`;
 }
 
@@ -52,17 +53,19 @@ const percent = (/** @type {number} */ value) => `${value < 99.5 ? value.toPreci
 /** a point of the study: cost, error, and the error of the force where it was judged @param {StudyPoint} point */
 export const pointText = (point) =>
     `${plainLabel(point.label)}: ${milliseconds(point.cost_ms)}, ${millimetres(point.error_m)}` +
-    (point.force_percent === undefined ? "" : `, force ${percent(point.force_percent)} off at 50 ms`);
+    (point.force_percent === undefined
+        ? ""
+        : `, ${textOf("accuracy.force_off", { percent: percent(point.force_percent) })}`);
 
 /** @param {number | undefined} ms */
-export const milliseconds = (ms) => (ms === undefined ? "unknown" : `${short(ms)} ms`);
+export const milliseconds = (ms) => (ms === undefined ? textOf("accuracy.unknown") : `${short(ms)} ms`);
 
 /**
  * The largest error with its age and remarks. `known`: the parts have values.
  * @param {Estimate | null} estimate @returns {{error: string, age: string, note: string, known: boolean}}
  */
 export function errorText(estimate) {
-    if (!estimate) return { error: "being estimated", age: "", note: "", known: false };
+    if (!estimate) return { error: textOf("accuracy.estimating"), age: "", note: "", known: false };
     const {
         age_s = 0,
         error_m,
@@ -74,22 +77,27 @@ export function errorText(estimate) {
         force_percent,
     } = estimate;
     if (tick === 0)
-        return { error: diagnostic ? "not estimated" : "being estimated", age: "", note: diagnostic, known: false };
+        return {
+            error: textOf(diagnostic ? "accuracy.not_estimated" : "accuracy.estimating"),
+            age: "",
+            note: diagnostic,
+            known: false,
+        };
     // rounding errors of a body that nothing moves say nothing
     if (max_displacement_m !== undefined && max_displacement_m < REST_M)
-        return { error: "none: at rest", age: "", note: "", known: false };
+        return { error: textOf("accuracy.at_rest"), age: "", note: "", known: false };
     const notes = [
         diagnostic.replace(/([^.])$/, "$1."),
-        locking ? "Volumetric locking: the true error is larger." : "",
+        locking ? textOf("accuracy.locking") : "",
         energy_error_percent !== undefined && error_m !== undefined && error_m >= RESOLUTION_M
-            ? `Relative error in the energy norm: ${energy_error_percent.toPrecision(2)} %.`
+            ? textOf("accuracy.energy", { percent: energy_error_percent.toPrecision(2) })
             : "",
-        force_percent === undefined ? "" : `Force of tools: ${percent(force_percent)} off.`,
+        force_percent === undefined ? "" : textOf("accuracy.force", { percent: percent(force_percent) }),
     ];
-    const age = age_s > OLD_S ? `${short(Math.round(age_s))} s ago` : "";
+    const age = age_s > OLD_S ? textOf("time.seconds_ago", { n: short(Math.round(age_s)) }) : "";
     const share =
         positive(error_m) && positive(max_displacement_m) && error_m >= RESOLUTION_M
-            ? `, ${percent((100 * error_m) / max_displacement_m)} of what moves`
+            ? `, ${textOf("accuracy.share", { percent: percent((100 * error_m) / max_displacement_m) })}`
             : "";
     return { error: millimetres(error_m) + share, age, note: notes.filter(Boolean).join(" "), known: true };
 }
@@ -106,45 +114,38 @@ export function partsOf(estimate) {
 
 /** @param {number} ratio of the errors */
 function gainText(ratio) {
-    if (ratio > 0.43 && ratio < 0.57) return "half the error";
-    if (ratio > 1.75 && ratio < 2.3) return "twice the error";
-    if (Math.abs(ratio - 1) < 0.02) return "same error";
-    if (ratio < 1) return `${Math.round(100 * (1 - ratio))} % less error`;
-    return ratio < 2 ? `${Math.round(100 * (ratio - 1))} % more error` : `${short(ratio)} times the error`;
+    if (ratio > 0.43 && ratio < 0.57) return textOf("accuracy.gain.half");
+    if (ratio > 1.75 && ratio < 2.3) return textOf("accuracy.gain.twice");
+    if (Math.abs(ratio - 1) < 0.02) return textOf("accuracy.gain.same");
+    if (ratio < 1) return textOf("accuracy.gain.less", { percent: Math.round(100 * (1 - ratio)) });
+    return ratio < 2
+        ? textOf("accuracy.gain.more", { percent: Math.round(100 * (ratio - 1)) })
+        : textOf("accuracy.gain.times", { n: short(ratio) });
 }
 
 /**
- * What a neighbour gains and costs: "half the error: +4.1 ms".
+ * What a neighbour gains and costs: "half the error, 4.1 ms slower".
  * @param {Estimate} now @param {Neighbour} to
  */
 export function neighbourText(now, to) {
     const cost = positive(now.cost_ms) && positive(to.cost_ms) ? to.cost_ms - now.cost_ms : null;
-    const difference = cost === null ? "" : `${cost > 0 ? "+" : "−"}${short(Math.abs(cost))} ms`;
-    const costText = cost === null ? "" : Math.abs(cost) < SAME_MS ? ": same cost" : `: ${difference}`;
+    const ms = cost === null ? "" : short(Math.abs(cost));
+    const costText =
+        cost === null
+            ? ""
+            : ", " +
+              (Math.abs(cost) < SAME_MS
+                  ? textOf("accuracy.same_speed")
+                  : textOf(cost < 0 ? "accuracy.ms_faster" : "accuracy.ms_slower", { ms }));
     if (!known(now.error_m) || !known(to.error_m)) return plainLabel(to.label) + costText;
     const ratio = Math.max(RESOLUTION_M, to.error_m) / Math.max(RESOLUTION_M, now.error_m);
     return gainText(ratio) + costText;
 }
 
-/** the errors of both configurations bound the displacement of a switch @param {Record<string, number>} args */
-function boundText({ max_move_m, bound_m }) {
-    if (typeof bound_m !== "number") return "";
-    return max_move_m <= Math.max(bound_m, RESOLUTION_M)
-        ? ` (bound ${millimetres(bound_m)})`
-        : ` (beyond the bound of ${millimetres(bound_m)})`;
-}
-
 /** what a switch of the configuration did @param {import("./control_table.js").Answer} answer */
 export function switchText({ text, args = {} }) {
-    const { energy_percent, max_frame_move_m, prepare_ms, max_move_m } = args;
-    const facts = [];
-    if (energy_percent !== undefined)
-        facts.push(`energy ${energy_percent > -0.005 ? "+" : "−"}${Math.abs(energy_percent).toFixed(2)} %`);
-    if (max_move_m !== undefined) facts.push(`surface moves ${millimetres(max_move_m)}${boundText(args)}`);
-    if (max_frame_move_m !== undefined) facts.push(`${millimetres(max_frame_move_m)} per frame`);
-    if (prepare_ms !== undefined)
-        facts.push(
-            `prepared in ${prepare_ms < 1000 ? `${prepare_ms.toFixed(0)} ms` : `${(prepare_ms / 1000).toFixed(1)} s`}`,
-        );
-    return facts.length ? `Switched: ${facts.join(", ")}.` : text;
+    const { max_move_m, prepare_ms } = args;
+    if (max_move_m === undefined || prepare_ms === undefined) return text;
+    const time = prepare_ms < 1000 ? `${prepare_ms.toFixed(0)} ms` : `${(prepare_ms / 1000).toFixed(1)} s`;
+    return textOf("accuracy.switched", { time, move: millimetres(max_move_m) });
 }

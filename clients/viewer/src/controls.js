@@ -1,6 +1,7 @@
 // The buttons at the foot of the page and the keys that do the same.
 import { buttonById, byId, chooseByArrows, htmlById, markRadio } from "./dom.js";
 import { keyMap } from "./keys.js";
+import { text } from "./text.js";
 
 /** @typedef {"pull" | "press" | "sculpt"} Mode what a drag does */
 
@@ -116,7 +117,7 @@ export class Controls {
 
     /** @param {boolean} paused */
     showPaused(paused) {
-        buttonById("pause").textContent = paused ? "Resume" : "Pause";
+        buttonById("pause").textContent = text(paused ? "tools.resume" : "tools.pause");
         buttonById("pause").setAttribute("aria-pressed", String(paused));
         buttonById("step").hidden = !paused || this.page.state.members.get(this.page.state.ownId)?.role === "viewer";
         this.showRights();

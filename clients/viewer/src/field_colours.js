@@ -1,6 +1,6 @@
 // The values of a field on one body, blended from one set to the next and shown as colours by the tissue's shader.
-import { makeUniforms, MATT, WET } from "./tissue_material.js";
 import * as THREE from "./three.js";
+import { makeUniforms, MATT, WET } from "./tissue_material.js";
 
 const BLEND_MS = 100; // the interval of FIELD messages
 

@@ -1,5 +1,6 @@
 // Where things stand on the page: the organ between the panels, notices, the state of the connection.
 import { htmlById } from "./dom.js";
+import { text as textOf } from "./text.js";
 
 const WIDTH_MIN = 260; // pixels between panels that the organ needs
 const NARROW = 640; // pixels: on a narrower page the panels lie below the organ, as in style.css
@@ -8,6 +9,7 @@ const MARGIN = 18; // pixels beside a panel
 export class Layout {
     /** the stage is set when it exists @type {import("./stage.js").Stage | null} */
     stage = null;
+    silent = false; // the server does not answer
     pending = false; // panels have moved while a drag held the organ in place
     noticeTimer = 0; // 0: the notice stays
 
@@ -49,8 +51,9 @@ export class Layout {
     /** the picture is old while the server does not answer @param {number} seconds 0: it answers */
     silence(seconds) {
         document.body.classList.toggle("silent", seconds > 0);
-        if (seconds > 0) this.connection("lost", `no answer from the server for ${seconds} s`);
-        else if (htmlById("state-text").textContent?.startsWith("no answer")) this.connection("live", "live");
+        if (seconds > 0) this.connection("lost", textOf("state.silent", { s: seconds }));
+        else if (this.silent) this.connection("live", textOf("state.live"));
+        this.silent = seconds > 0;
     }
 
     /** @param {import("./link.js").ConnectionState} state @param {string} text */

@@ -6,6 +6,7 @@ import { readControl } from "./control_reader.js";
 import { decodeField, readFieldHead } from "./field_decoder.js";
 import { FrameDecoder, readFrameHead } from "./frame_decoder.js";
 import { vertexNormals } from "./normals.js";
+import { text as textOf } from "./text.js";
 import { applyTopologyDelta, readTopologyDeltaHead, shownOf } from "./topology_delta.js";
 import { KIND, POSE_FLAG, PROTOCOL, readHead, readTools, writeAck, writePose } from "./wire.js";
 
@@ -26,12 +27,12 @@ const CLOSE_UNREADABLE = 4900; // close code: the server sent what this page can
 
 /** close codes after which reconnection is useless, with the text for the user */
 const FINAL = new Map([
-    [1002, "the server rejected a message of this page"],
-    [1008, "access denied"],
-    [1009, "the server rejected a message of this page"],
-    [4001, "this page sent too many messages"],
-    [CLOSE_NO_SESSION, "there is no such session"],
-    [4005, "you cannot take part any more"],
+    [1002, textOf("link.rejected")],
+    [1008, textOf("link.denied")],
+    [1009, textOf("link.rejected")],
+    [4001, textOf("link.flood")],
+    [CLOSE_NO_SESSION, textOf("link.no_session")],
+    [4005, textOf("link.removed")],
 ]);
 
 /**
@@ -154,7 +155,7 @@ export class Link {
     dial() {
         const generation = this.generation;
         this.reset();
-        this.report("connecting", this.tries ? "reconnecting" : "connecting");
+        this.report("connecting", textOf(this.tries ? "state.reconnecting" : "state.connecting"));
         const { ticket, url } = this.options;
         const socket = this.env.open(url, ticket ? [PROTOCOL, TICKET + ticket] : [PROTOCOL]);
         socket.binaryType = "arraybuffer";
@@ -193,7 +194,9 @@ export class Link {
             const full = event.code === CLOSE_FULL;
             this.report(
                 "lost",
-                full ? `${event.reason || "the session is full"}, trying again` : "connection lost, reconnecting",
+                full
+                    ? textOf("link.full", { reason: event.reason || textOf("link.session_full") })
+                    : textOf("link.lost"),
             );
             const next = this.generation;
             this.env.later(() => next === this.generation && this.dial(), pause);

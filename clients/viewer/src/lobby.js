@@ -2,6 +2,8 @@
 import { decodeAsset } from "./asset.js";
 import { htmlById } from "./dom.js";
 import { drawSurfaces } from "./picture.js";
+import { speedText } from "./plan_panel.js";
+import { text as textOf } from "./text.js";
 
 const REFRESH_MS = 2000;
 const SLOW = 1.05; // slowdown that still counts as real time
@@ -23,17 +25,22 @@ export const offersChoice = ({ sessions, scenes }) =>
 
 /** @param {Session} session @returns {string} */
 export function stateText({ state, slowdown = 1, text }) {
-    if (state === "opening") return "is being opened";
-    if (state === "failed") return text ? `cannot be opened: ${text}` : "cannot be opened";
-    if (state !== "running") return state === "paused" ? "paused" : "plays a recording";
-    return slowdown > SLOW ? `${(1 / slowdown).toFixed(2)} of real time` : "running";
+    if (state === "failed" && text) return textOf("lobby.failed_by", { reason: text });
+    if (state !== "running") return textOf(`lobby.state.${state}`);
+    return slowdown > SLOW ? speedText(slowdown) : textOf("lobby.state.running");
 }
 
 /** @param {Session} session @returns {string} */
 export function peopleText({ people, members = 0 }) {
-    if (!members) return "nobody is here";
-    if (!people?.length) return members === 1 ? "1 member" : `${members} members`;
-    return people.map(({ name, role }) => (role === "trainee" ? name : `${name} (${role})`)).join(", ");
+    if (!members) return textOf("lobby.nobody");
+    if (!people?.length) return members === 1 ? textOf("lobby.member") : textOf("lobby.members", { n: members });
+    return people
+        .map(({ name, role }) =>
+            role === "trainee"
+                ? name
+                : `${name} (${textOf(role === "instructor" ? "role.instructor" : "role.viewer")})`,
+        )
+        .join(", ");
 }
 
 export class Lobby {
@@ -64,7 +71,7 @@ export class Lobby {
     open(list) {
         this.page.body.classList.add("choosing");
         htmlById("lobby", this.page).hidden = false;
-        this.page.title = "Sessions · Palpate";
+        this.page.title = `${textOf("lobby.title")} · Palpate`;
         this.show(list);
         setInterval(async () => {
             const now = await this.read();
@@ -84,7 +91,7 @@ export class Lobby {
             });
             note.textContent = reply.ok ? "" : ((await reply.json().catch(() => null))?.error ?? reply.statusText);
         } catch {
-            note.textContent = "The server does not answer.";
+            note.textContent = textOf("lobby.silent");
         }
         const now = await this.read();
         if (now) this.show(now);
@@ -151,16 +158,16 @@ export class Lobby {
             return a;
         };
         const end = () => {
-            const button = Object.assign(document.createElement("button"), { textContent: "End" });
-            button.setAttribute("aria-label", `End ${name}`);
+            const button = Object.assign(document.createElement("button"), { textContent: textOf("lobby.end") });
+            button.setAttribute("aria-label", `${textOf("lobby.end")} ${name}`);
             // a second press within some seconds means it
             button.onclick = () => {
                 if (button.dataset.sure) return void this.order({ end: name });
                 button.dataset.sure = "yes";
-                button.textContent = "End for everybody?";
+                button.textContent = textOf("lobby.end_sure");
                 setTimeout(() => {
                     delete button.dataset.sure;
-                    button.textContent = "End";
+                    button.textContent = textOf("lobby.end");
                 }, 4000);
             };
             return button;
@@ -169,7 +176,11 @@ export class Lobby {
             .split(" ")
             .filter(Boolean)
             .map((action) =>
-                action === "join" ? link("Join", "") : action === "watch" ? link("Watch", "&role=viewer") : end(),
+                action === "join"
+                    ? link(textOf("lobby.join"), "")
+                    : action === "watch"
+                      ? link(textOf("lobby.watch"), "&role=viewer")
+                      : end(),
             );
     }
 
@@ -206,7 +217,7 @@ export class Lobby {
                     textContent: scene,
                     onclick: () => void this.order({ open: scene }),
                 });
-                button.setAttribute("aria-label", `Open ${scene}`);
+                button.setAttribute("aria-label", textOf("lobby.open", { scene }));
                 item.append(button);
                 return item;
             }),

@@ -20,6 +20,8 @@ import { PoseSender } from "./pose_sender.js";
 import { showScale } from "./scale_bar.js";
 import { SculptPanel } from "./sculpt_panel.js";
 import { Stage } from "./stage.js";
+import { store, stored } from "./storage.js";
+import { language, text } from "./text.js";
 import { takeTicket } from "./ticket.js";
 import { ToolInput } from "./tool_input.js";
 import { ToolMarks } from "./tool_marks.js";
@@ -27,7 +29,7 @@ import { ToolMarks } from "./tool_marks.js";
 const FORCE_MIN_N = 0.005; // a smaller force is displayed as 0.00
 const MARK_RADIUS = 0.006; // of the scene's size: smallest drawn radius of a tool
 
-const worker = new Worker(new URL("./socket_worker.js", import.meta.url), { type: "module" });
+const worker = new Worker(new URL(`./socket_worker.js?lang=${language}`, import.meta.url), { type: "module" });
 /** @param {import("./link.js").WorkerMessage} message @param {Transferable[]} transfer */
 const post = (message, transfer = []) => worker.postMessage(message, transfer);
 /** @param {import("./control_table.js").ClientMessage} message */
@@ -75,8 +77,8 @@ function makeStage() {
     try {
         return new Stage(byId("view", HTMLCanvasElement));
     } catch (error) {
-        layout.connection("refused", "no WebGL 2");
-        layout.notice("This browser does not provide WebGL 2, so the organ cannot be drawn.");
+        layout.connection("refused", text("state.no_webgl"));
+        layout.notice(text("notice.no_webgl"));
         throw error;
     }
 }
@@ -134,15 +136,6 @@ function draw() {
     }
 }
 
-/** @returns {string} */
-function storedName() {
-    try {
-        return localStorage.getItem("palpate.name") ?? "Guest";
-    } catch {
-        return "Guest";
-    }
-}
-
 function connect() {
     const query = new URLSearchParams(location.search);
     const session = query.get("session");
@@ -150,17 +143,14 @@ function connect() {
     const url = `${scheme}://${location.host}/ws${session ? "?session=" + encodeURIComponent(session) : ""}`;
     // with a ticket: whatever it allows
     const role = ROLES.find((known) => known === query.get("role")) ?? (ticket ? "instructor" : "trainee");
-    post({ type: "connect", url, name: inputById("name").value.trim() || "Guest", role, ticket });
+    post({ type: "connect", url, name: inputById("name").value.trim() || text("people.guest"), role, ticket });
 }
 
 htmlById("lobby-link").hidden = !new URLSearchParams(location.search).has("session");
-inputById("name").value = new URLSearchParams(location.search).get("name") ?? storedName();
+inputById("name").value =
+    new URLSearchParams(location.search).get("name") ?? stored("palpate.name") ?? text("people.guest");
 inputById("name").onchange = () => {
-    try {
-        localStorage.setItem("palpate.name", inputById("name").value.trim());
-    } catch {
-        // without storage the name lasts as long as the page
-    }
+    store("palpate.name", inputById("name").value.trim());
     connect();
 };
 // read-only access for tests and for the console

@@ -1,6 +1,7 @@
 // Who is here, who did what, and what an instructor may do about it.
 import { buttonById, htmlById } from "./dom.js";
 import { cssColour } from "./plan_panel.js";
+import { text as textOf } from "./text.js";
 
 /**
  * @typedef {import("./control_table.js").Member} Member
@@ -8,15 +9,10 @@ import { cssColour } from "./plan_panel.js";
  * @typedef {{id: number, name: string, text: string, at: number}} Order
  */
 
-/** what trainees may be let do, with the words for it */
-export const RIGHTS = Object.freeze({
-    steer: "pause and reset",
-    material: "change material",
-    component: "switch components",
-    configure: "change accuracy",
-    sculpt: "sculpt",
-    cut: "cut open",
-});
+/** what trainees may be let do */
+export const RIGHTS = Object.freeze(
+    /** @type {const} */ (["steer", "material", "component", "configure", "sculpt", "cut"]),
+);
 const ORDERS_SHOWN = 6;
 
 /** @param {string} text @param {string} title @param {() => void} action */
@@ -37,7 +33,9 @@ function checkbox(text, checked, action) {
 
 /** "3 s ago", "2 min ago" @param {number} seconds */
 export const agoText = (seconds) =>
-    seconds < 60 ? `${Math.max(0, Math.round(seconds))} s ago` : `${Math.round(seconds / 60)} min ago`;
+    seconds < 60
+        ? textOf("time.seconds_ago", { n: Math.max(0, Math.round(seconds)) })
+        : textOf("time.minutes_ago", { n: Math.round(seconds / 60) });
 
 export class MembersPanel {
     /** @type {Order[]} newest first */
@@ -71,7 +69,7 @@ export class MembersPanel {
         this.room.hidden = !instructs;
         if (!instructs) return;
         const lock = buttonById("lock-session");
-        lock.textContent = this.locked ? "Let others join" : "Let nobody else join";
+        lock.textContent = textOf(this.locked ? "people.unlock" : "people.lock");
         lock.setAttribute("aria-pressed", String(this.locked));
         htmlById("tool-choices").replaceChildren(
             ...tools.map(({ name }, tool) => this.toolRow(tool, name, message, ownId)),
@@ -87,12 +85,16 @@ export class MembersPanel {
         const holds = (tool ?? -1) >= 0;
         const dot = document.createElement("i");
         dot.style.background = cssColour(colour);
-        title.textContent = name + (id === ownId ? " (you)" : "");
+        title.textContent = id === ownId ? textOf("people.you", { name }) : name;
+        const kind = role === "instructor" || role === "trainee" ? role : "viewer";
         note.textContent =
-            "  " + (muted ? "may only watch" : holds ? role : role === "viewer" ? "watching" : "no tool");
+            "  " +
+            textOf(
+                muted ? "people.muted" : holds ? `role.${kind}` : kind === "viewer" ? "role.viewer" : "people.no_tool",
+            );
         item.append(dot, title, note);
         if (!instructs || id === ownId || role === "instructor") return item;
-        const more = button("…", `What ${name} may do`, () => {
+        const more = button("…", textOf("people.choices", { name }), () => {
             this.opened = this.opened === id ? 0 : id;
             choices.hidden = this.opened !== id;
             more.setAttribute("aria-expanded", String(!choices.hidden));
@@ -111,20 +113,20 @@ export class MembersPanel {
         const has = (rights ?? "").split(" ");
         choices.className = "choices";
         if (role === "trainee")
-            for (const [right, text] of Object.entries(RIGHTS))
+            for (const right of RIGHTS)
                 choices.append(
-                    checkbox(`may ${text}`, has.includes(right), (enabled) =>
+                    checkbox(textOf(`people.may.${right}`), has.includes(right), (enabled) =>
                         this.send({ verb: "allow", target: right, args: { member: id, enabled: enabled ? 1 : 0 } }),
                     ),
                 );
         choices.append(
-            checkbox("may only watch", muted === true, (enabled) =>
+            checkbox(textOf("people.muted"), muted === true, (enabled) =>
                 this.send({ verb: "mute", args: { member: id, enabled: enabled ? 1 : 0 } }),
             ),
-            button("Remove", `Close the connection of ${name}`, () =>
+            button(textOf("people.remove"), textOf("people.remove.tip", { name }), () =>
                 this.send({ verb: "remove", args: { member: id } }),
             ),
-            button("Ban", `Remove ${name}, who may not come back`, () =>
+            button(textOf("people.ban"), textOf("people.ban.tip", { name }), () =>
                 this.send({ verb: "ban", args: { member: id } }),
             ),
         );
@@ -137,18 +139,19 @@ export class MembersPanel {
      */
     toolRow(tool, name, { members, locked_tools }, ownId) {
         const row = document.createElement("div");
-        const holder = Object.assign(document.createElement("select"), { title: `Who holds ${name}` });
-        holder.setAttribute("aria-label", `Who holds ${name}`);
-        holder.append(new Option("nobody", "0"));
+        const holder = Object.assign(document.createElement("select"), { title: textOf("people.holder", { name }) });
+        holder.setAttribute("aria-label", holder.title);
+        holder.append(new Option(textOf("people.nobody"), "0"));
         for (const { id, name: who, role, muted } of members)
-            if (role !== "viewer" && !muted) holder.append(new Option(id === ownId ? `${who} (you)` : who, String(id)));
+            if (role !== "viewer" && !muted)
+                holder.append(new Option(id === ownId ? textOf("people.you", { name: who }) : who, String(id)));
         holder.value = String(members.find((member) => member.tool === tool)?.id ?? 0);
         holder.onchange = () => this.send({ verb: "hand_over", args: { tool, member: Number(holder.value) } });
         const locked = locked_tools?.includes(tool) === true;
         row.append(
             name,
             holder,
-            checkbox("locked", locked, (enabled) =>
+            checkbox(textOf("people.locked"), locked, (enabled) =>
                 this.send({ verb: "lock_tool", args: { tool, enabled: enabled ? 1 : 0 } }),
             ),
         );
@@ -181,7 +184,10 @@ export class MembersPanel {
 
     /** @param {number} id */
     nameOf(id) {
-        return this.members.find((member) => member.id === id)?.name ?? (id ? `member ${id}` : "nobody");
+        return (
+            this.members.find((member) => member.id === id)?.name ??
+            (id ? textOf("people.member", { id }) : textOf("people.nobody"))
+        );
     }
 
     begin() {

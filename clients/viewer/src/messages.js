@@ -2,7 +2,9 @@
 import { UNSEEN } from "./body_set.js";
 import { buttonById, htmlById } from "./dom.js";
 import { componentsOf, idleText } from "./plan_list.js";
+import { speedText } from "./plan_panel.js";
 import { playbackText } from "./playback_bar.js";
+import { text as textOf } from "./text.js";
 import { sameTools } from "./tool_marks.js";
 
 /**
@@ -111,7 +113,7 @@ export class Messages {
             [h?.session, h?.box_min_m, h?.box_max_m, h?.up].join();
         const sameScene = scene(state.hello) === scene(message);
         if (state.hello?.started && message.started !== state.hello.started)
-            this.page.layout.notice("The server was started again.", NOTICE_MS);
+            this.page.layout.notice(textOf("notice.restarted"), NOTICE_MS);
         state.hello = message;
         state.ownId = message.you.id;
         state.ownTool = message.you.tool ?? -1;
@@ -159,7 +161,10 @@ export class Messages {
             if (verb === "resume") this.pausedBy = "";
             // what everybody sees happen has a name; older ones stand in the list
             if (verb === "reset" && id !== this.page.state.ownId && age_s < RECENT_S)
-                this.page.layout.notice(`${name} reset ${target || "the scene"}.`, NOTICE_MS);
+                this.page.layout.notice(
+                    textOf("notice.reset", { name, target: target || textOf("notice.scene") }),
+                    NOTICE_MS,
+                );
         }
     }
 
@@ -178,10 +183,12 @@ export class Messages {
         const text = playback
             ? playbackText(playback, message.paused)
             : message.paused
-              ? `paused${this.pausedBy ? ` by ${this.pausedBy}` : ""}`
+              ? this.pausedBy
+                  ? textOf("state.paused_by", { name: this.pausedBy })
+                  : textOf("state.paused")
               : slow
-                ? `${(1 / message.slowdown).toFixed(2)} of real time`
-                : "live";
+                ? speedText(message.slowdown)
+                : textOf("state.live");
         layout.connection(message.frozen ? "lost" : "live", text);
         this.showFigures();
     }
@@ -222,8 +229,9 @@ export class Messages {
     stoppedText(status) {
         const stopped = status.parts?.filter((part) => part.frozen) ?? [];
         const names = stopped.map(({ part }) => this.page.state.parts[part]?.name ?? String(part));
-        const reason = stopped[0]?.reason ?? "The simulation diverged.";
-        return `${names.length ? `${names.join(", ")} stopped. ` : ""}${reason} Reset restores the rest shape.`;
+        const reason = stopped[0]?.reason ?? textOf("notice.diverged");
+        const who = names.length ? textOf("notice.stopped", { names: names.join(", ") }) : "";
+        return [who, reason, textOf("notice.reset_helps")].filter(Boolean).join(" ");
     }
 
     showTitle() {
@@ -231,7 +239,7 @@ export class Messages {
         if (!hello) return;
         document.title = `${hello.title} · Palpate`;
         htmlById("title").textContent = hello.title;
-        htmlById("source").textContent = hello.organ;
+        htmlById("about-source").textContent = hello.organ;
         htmlById("accuracy").textContent = hello.accuracy ?? "";
         htmlById("accuracy").hidden = !hello.accuracy;
     }
@@ -244,17 +252,16 @@ export class Messages {
         if (!input.enabled && state.members.has(state.ownId)) {
             hint.classList.remove("gone");
             hint.textContent = this.watchingText();
-        } else if (!hint.classList.contains("gone"))
-            hint.textContent = "Drag the organ to pull it. Drag beside it to look around.";
+        } else if (!hint.classList.contains("gone")) hint.textContent = textOf("hint.drag");
     }
 
     /** why a member without a tool moves nothing @returns {string} */
     watchingText() {
         const own = this.page.state.members.get(this.page.state.ownId);
-        if (this.page.state.plays) return "This is a recording. Drag to look around.";
-        if (own?.role === "viewer") return "You are watching. Drag to look around.";
-        if (own?.muted) return "An instructor lets you watch only. Drag to look around.";
-        return "All tools are in use. You are watching; you get a tool as soon as one is free.";
+        if (this.page.state.plays) return textOf("hint.recording");
+        if (own?.role === "viewer") return textOf("hint.watching");
+        if (own?.muted) return textOf("hint.muted");
+        return textOf("hint.full");
     }
 
     /** components come and go with fields, switches and other methods */

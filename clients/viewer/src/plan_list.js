@@ -1,5 +1,6 @@
 // What the panel says of the plan and the bodies: components that run and that are disabled, bodies with a remark, what is
 // not computed. Pure.
+import { text } from "./text.js";
 
 /**
  * @typedef {import("./app_state.js").Plan} Plan
@@ -28,7 +29,15 @@ export function rateText(bytes) {
 export function activeText(active, parts) {
     return active.map((a) => {
         const name = parts.length > 1 ? `${parts[a.part]?.name ?? a.part}: ` : "";
-        return `${name}${count(a.nodes)} of ${count(a.finest_nodes)} nodes, ${count(a.springs)} of ${count(a.finest_springs)} springs`;
+        return (
+            name +
+            text("details.active", {
+                nodes: count(a.nodes),
+                finest_nodes: count(a.finest_nodes),
+                springs: count(a.springs),
+                finest_springs: count(a.finest_springs),
+            })
+        );
     });
 }
 
@@ -74,15 +83,13 @@ export function componentsOf(plan, status) {
  */
 export function bodyRemarks(states, parts) {
     return states.map(({ part, frozen = false, asleep, reason, safeguards = 0, safeguard_ms = 0 }) => {
-        const text = frozen ? [reason || "It left its bounds."] : [];
+        const lines = frozen ? [reason || text("body.out_of_bounds")] : [];
         if (safeguards) {
             const ms = safeguard_ms.toFixed(safeguard_ms < 1 ? 3 : 1);
-            text.push(
-                `${count(safeguards)} ${safeguards === 1 ? "step" : "steps"} corrected by a safeguard, ${ms} ms in total.`,
-            );
+            lines.push(text(safeguards === 1 ? "body.safeguard" : "body.safeguards", { n: count(safeguards), ms }));
         }
         const state = frozen ? "stopped" : asleep ? "asleep" : "";
-        return { name: parts[part]?.name ?? String(part), frozen, state, text };
+        return { name: parts[part]?.name ?? String(part), frozen, state, text: lines };
     });
 }
 
@@ -91,9 +98,12 @@ export function bodyRemarks(states, parts) {
  * @param {{field: boolean, estimate: boolean, estimates: boolean, unobserved: number}} shown
  */
 export function idleText({ field, estimate, estimates, unobserved }) {
-    const idle = [...(field ? [] : ["field values"]), ...(estimate || !estimates ? [] : ["error estimates"])];
-    const now = idle.length ? `Not displayed, therefore not computed: ${idle.join(", ")}.` : "";
-    const before = unobserved > 0 ? `${count(unobserved)} steps were simulated without any viewer.` : "";
+    const idle = [
+        ...(field ? [] : [text("details.idle.field")]),
+        ...(estimate || !estimates ? [] : [text("details.idle.estimate")]),
+    ];
+    const now = idle.length ? text("details.idle", { what: idle.join(", ") }) : "";
+    const before = unobserved > 0 ? text("details.unobserved", { n: count(unobserved) }) : "";
     return [now, before].filter(Boolean).join(" ");
 }
 
@@ -105,7 +115,5 @@ export function barLengths(ms) {
 
 /** why a component cannot be disabled @param {Component} component */
 export function fixedReason({ planned }) {
-    return planned
-        ? "Cannot be disabled: it moves the body, outputs it, or is the only one that holds it together."
-        : "Cannot be disabled: it runs while something else needs it.";
+    return text(planned ? "effect.fixed" : "effect.needed");
 }

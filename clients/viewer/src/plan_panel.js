@@ -1,7 +1,9 @@
 // The panel of figures: rates and times, the components of the plan with their times and switches, bodies that are
 // stopped or asleep, activity of bodies that adapt.
-import { htmlById } from "./dom.js";
+import { htmlById, inputById } from "./dom.js";
 import { activeText, barLengths, bodyRemarks, fixedReason, rateText } from "./plan_list.js";
+import { store, stored } from "./storage.js";
+import { isTextKey, language, text as textOf } from "./text.js";
 
 /**
  * @typedef {import("./plan_list.js").Component} Component
@@ -13,6 +15,15 @@ const ANSWER_MS = 3000; // a switch is enabled again if the server has not answe
 /** @param {number} colour 0xRRGGBB */
 export const cssColour = (colour) => "#" + colour.toString(16).padStart(6, "0");
 
+/** what an effect is called; the name of the code stands in the tooltip @param {string} name */
+const effectName = (name) => {
+    const key = `effect.name.${name}`;
+    return isTextKey(key) ? textOf(key) : name.replaceAll("_", " ");
+};
+
+/** @param {number} slowdown real time over simulated time */
+export const speedText = (slowdown) => textOf("state.speed", { speed: (1 / slowdown).toFixed(2) });
+
 export class PlanPanel {
     /** @param {Document} page @param {(command: Command) => void} send */
     constructor(page, send) {
@@ -23,19 +34,31 @@ export class PlanPanel {
         this.bodies = htmlById("bodies", page);
         this.components = /** @type {HTMLTableSectionElement} */ (page.querySelector("#components tbody"));
         this.active = htmlById("active", page);
+        const expert = inputById("expert", page);
+        expert.checked = stored("palpate.expert") === "1";
+        expert.onchange = () => {
+            store("palpate.expert", expert.checked ? "1" : "");
+            htmlById("panel", page).classList.toggle("all", expert.checked);
+        };
+        htmlById("panel", page).classList.toggle("all", expert.checked);
         /** @type {Map<string, HTMLElement>} */
         this.values = new Map();
         /** @type {{bar: HTMLElement, value: HTMLElement, index: number | null}[]} */
         this.bars = [];
     }
 
-    /** @param {string} name @param {string} text */
-    figure(name, text) {
+    /**
+     * @param {import("./text.js").TextKey} name @param {string} text
+     * @param {boolean} expert only those who develop scenes read it
+     */
+    figure(name, text, expert = false) {
         let value = this.values.get(name);
         if (!value) {
             const term = document.createElement("dt");
             value = document.createElement("dd");
-            term.textContent = name;
+            term.textContent = textOf(name);
+            term.classList.toggle("expert", expert);
+            value.classList.toggle("expert", expert);
             this.figures.append(term, value);
             this.values.set(name, value);
         }
@@ -48,11 +71,11 @@ export class PlanPanel {
         this.bars = components.map((component) => {
             const { name, part, reason, on, index } = component;
             const row = this.components.insertRow();
-            row.title = reason && `Required by ${reason}`;
+            row.title = reason ? textOf("effect.required", { name, reason }) : name;
             row.className = on ? "" : "off";
             if (switches) row.append(this.switchOf(component));
             const title = row.insertCell();
-            title.textContent = name.replaceAll("_", " ");
+            title.textContent = effectName(name);
             if (parts.length > 1 && parts[part])
                 title.append(" ", Object.assign(document.createElement("small"), { textContent: parts[part].name }));
             const cell = row.insertCell();
@@ -60,7 +83,7 @@ export class PlanPanel {
             const bar = document.createElement("i");
             if (on) cell.append(bar);
             const value = row.insertCell();
-            value.textContent = on ? "–" : "off";
+            value.textContent = on ? "–" : textOf("effect.off");
             return { bar, value, index };
         });
     }
@@ -70,9 +93,9 @@ export class PlanPanel {
         const { name, part, on, fixed } = component;
         const cell = document.createElement("td");
         const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: on });
-        const action = on ? "Disable" : "Enable";
+        const action = textOf(on ? "effect.disable" : "effect.enable");
         cell.className = "switch";
-        box.setAttribute("aria-label", `Component ${name}`);
+        box.setAttribute("aria-label", effectName(name));
         box.disabled = fixed;
         cell.title = box.title = fixed ? fixedReason(component) : action;
         box.onchange = () => {
@@ -80,7 +103,7 @@ export class PlanPanel {
             // the box shows the state of the server, which may refuse
             box.checked = on;
             box.disabled = true;
-            box.title = "Waiting for the server";
+            box.title = textOf("wait.server");
             setTimeout(() => {
                 box.disabled = false;
                 box.title = action;
@@ -102,10 +125,12 @@ export class PlanPanel {
                 item.className = state;
                 if (frozen) item.classList.add("frozen");
                 title.textContent = name;
-                item.append(title, state ? ` ${state}` : "");
+                item.append(title, state ? ` ${textOf(state === "stopped" ? "body.stopped" : "body.asleep")}` : "");
                 item.append(...text.map((line) => Object.assign(document.createElement("p"), { textContent: line })));
                 if (frozen) {
-                    const reset = Object.assign(document.createElement("button"), { textContent: `Reset ${name}` });
+                    const reset = Object.assign(document.createElement("button"), {
+                        textContent: textOf("body.reset", { name }),
+                    });
                     reset.onclick = () => this.send({ verb: "reset", target: name, args: {} });
                     item.append(reset);
                 }
@@ -121,19 +146,18 @@ export class PlanPanel {
      */
     showStatus(status, figures, parts) {
         const { paused, slowdown } = status;
-        this.figure("steps per second", paused ? "paused" : status.step_rate_hz.toFixed(0));
-        this.figure(
-            "speed",
-            paused ? "–" : slowdown <= 1.02 ? "real time" : `${(1 / slowdown).toFixed(2)} of real time`,
-        );
-        this.figure("time per step", status.step_ms.toFixed(2) + " ms");
-        this.figure("sub-steps", String(status.substeps));
-        this.figure("round trip", figures.rtt_ms > 0 ? figures.rtt_ms.toFixed(1) + " ms" : "–");
-        this.figure("tool to frame", figures.latency_ms > 0 ? figures.latency_ms.toFixed(1) + " ms" : "–");
-        this.figure("frames drawn", figures.fps.toFixed(0) + " /s");
-        this.figure("frame decoding", figures.decode_ms.toFixed(2) + " ms");
-        this.figure("received", rateText(figures.bytes_s));
-        this.figure("visible vertices", figures.vertices.toLocaleString("en"));
+        const ms = (/** @type {number} */ v, /** @type {number} */ digits) => `${v.toFixed(digits)} ms`;
+        const speed = paused ? "–" : slowdown <= 1.02 ? textOf("state.real_time") : speedText(slowdown);
+        this.figure("details.speed", speed);
+        this.figure("details.step_time", ms(status.step_ms, 2));
+        this.figure("details.latency", figures.latency_ms > 0 ? ms(figures.latency_ms, 1) : "–");
+        this.figure("details.pictures", figures.fps.toFixed(0));
+        this.figure("details.steps", paused ? textOf("state.paused") : status.step_rate_hz.toFixed(0), true);
+        this.figure("details.substeps", String(status.substeps), true);
+        this.figure("details.round_trip", figures.rtt_ms > 0 ? ms(figures.rtt_ms, 1) : "–", true);
+        this.figure("details.decoding", ms(figures.decode_ms, 2), true);
+        this.figure("details.received", rateText(figures.bytes_s), true);
+        this.figure("details.vertices", figures.vertices.toLocaleString(language), true);
         this.showActivity(activeText(status.active ?? [], parts));
         this.showBodies(bodyRemarks(status.parts ?? [], parts));
         const lengths = barLengths(status.component_ms);

@@ -1,5 +1,6 @@
 // The bar of a recording: where it is, its marks, how fast it plays, and the way to go on live from there.
 import { buttonById, htmlById, inputById, makeOption, selectById } from "./dom.js";
+import { text as textOf } from "./text.js";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
 const STEPS_1_S = 10; // positions of the bar a second
@@ -15,9 +16,10 @@ export function timeText(s) {
 
 /** what the state of the connection says about a recording @param {Playback} playback @param {boolean} paused */
 export function playbackText({ plays, ended, speed }, paused) {
-    if (!plays) return "live";
-    if (ended) return "end of the recording";
-    return paused ? "recording, paused" : speed === 1 ? "recording" : `recording, ${speed}×`;
+    if (!plays) return textOf("state.live");
+    if (ended) return textOf("playback.end");
+    if (paused) return textOf("playback.paused");
+    return speed === 1 ? textOf("playback.plays") : textOf("playback.plays_at", { speed });
 }
 
 export class PlaybackBar {
@@ -67,7 +69,7 @@ export class PlaybackBar {
         htmlById("playback-marks", this.page).replaceChildren(
             ...(this.marks ?? []).map(({ time_s, text }) => {
                 const button = Object.assign(document.createElement("button"), {
-                    title: `${text} at ${timeText(time_s)}`,
+                    title: textOf("playback.mark", { text, time: timeText(time_s) }),
                     onclick: () => this.seek(time_s),
                 });
                 button.setAttribute("aria-label", button.title);
@@ -79,7 +81,7 @@ export class PlaybackBar {
 
     /** @param {number} time_s */
     showTime(time_s) {
-        const text = `${timeText(time_s)} of ${timeText(this.now?.length_s ?? 0)}`;
+        const text = textOf("playback.at", { time: timeText(time_s), length: timeText(this.now?.length_s ?? 0) });
         htmlById("playback-text", this.page).textContent = text;
         inputById("playback-time", this.page).setAttribute("aria-valuetext", text);
     }
@@ -98,7 +100,7 @@ export class PlaybackBar {
         branch.hidden = !may;
         speed.hidden = !may || !playback.plays;
         for (const mark of htmlById("playback-marks", this.page).querySelectorAll("button")) mark.disabled = !may;
-        branch.textContent = playback.plays ? "Go live from here" : "Back to the recording";
+        branch.textContent = textOf(playback.plays ? "playback.branch" : "playback.back");
         if (document.activeElement !== speed) speed.value = String(playback.speed);
         const drags = bar.matches(":active");
         if (drags) return;

@@ -1,7 +1,7 @@
 // Every text that the page shows, in the language of the user. The languages are files of the same keys; English is
 // complete, and a test compares the others with it. The address chooses (?lang=de), else the browser.
-import { ENGLISH } from "./text_en.js";
 import { GERMAN } from "./text_de.js";
+import { ENGLISH } from "./text_en.js";
 
 /** @typedef {keyof typeof ENGLISH} TextKey */
 
