@@ -1,7 +1,10 @@
 // The buttons at the foot of the page and the keys that do the same.
 import { buttonById, byId, chooseByArrows, htmlById, markRadio } from "./dom.js";
+import { KeyboardTool } from "./keyboard_tool.js";
 import { keyMap } from "./keys.js";
 import { text } from "./text.js";
+
+const KEYS_MS = 8000; // how long the keys that move the tool are named
 
 /** @typedef {"pull" | "press" | "sculpt"} Mode what a drag does */
 
@@ -33,7 +36,11 @@ export class Controls {
     }
 
     addKeys() {
-        const { accuracy, fields, sculpt, stage } = this.page;
+        const { accuracy, fields, input, layout, sculpt, stage } = this.page;
+        const keyboard = new KeyboardTool(stage, input, () => {
+            htmlById("hint").classList.add("gone");
+            layout.notice(text("hint.keys"), KEYS_MS);
+        });
         const actionOf = keyMap(
             {
                 1: () => this.setMode("pull"),
@@ -47,17 +54,23 @@ export class Controls {
                 m: () => this.toggleMesh(),
                 "?": () => this.openHelp(),
                 f1: () => this.openHelp(),
+                escape: () => this.closePanels(),
             },
             stage,
         );
         window.addEventListener("keydown", (e) => {
             // an open dialog has the keyboard; it closes with Escape by itself
             if (byId("help", HTMLDialogElement).open) return;
-            const action = sculpt.key(e) ? () => {} : actionOf(e);
+            const action = keyboard.key(e) || sculpt.key(e) ? () => {} : actionOf(e);
             if (!action) return;
             e.preventDefault();
             action();
         });
+    }
+
+    closePanels() {
+        if (!htmlById("panel").hidden) this.togglePanel();
+        this.openAccuracy(false);
     }
 
     openHelp() {
@@ -86,7 +99,7 @@ export class Controls {
         if (mode === "sculpt") this.openAccuracy(false);
         input.release();
         htmlById("sculpt").hidden = mode !== "sculpt";
-        this.place();
+        this.makeRoom(mode === "sculpt");
         if (mode === "sculpt") htmlById("hint").classList.add("gone");
         for (const name of ["pull", "press", "sculpt"]) markRadio(buttonById("mode-" + name), mode === name);
     }
@@ -135,6 +148,10 @@ export class Controls {
         const panel = htmlById("panel");
         panel.hidden = !panel.hidden;
         buttonById("panel-toggle").setAttribute("aria-expanded", String(!panel.hidden));
+        if (!panel.hidden && !this.page.layout.hasRoom()) {
+            this.openAccuracy(false);
+            if (this.page.input.mode === "sculpt") this.setMode("pull");
+        }
         this.place();
         this.page.showFigures();
     }
@@ -147,6 +164,12 @@ export class Controls {
         htmlById("accuracy-panel").hidden = !opened;
         buttonById("accuracy-toggle").setAttribute("aria-expanded", String(opened));
         accuracy.open(opened);
+        this.makeRoom(opened);
+    }
+
+    /** where two panels leave no room for the organ, one that opens closes the other @param {boolean} opened */
+    makeRoom(opened) {
+        if (opened && !htmlById("panel").hidden && !this.page.layout.hasRoom()) this.togglePanel();
         this.place();
     }
 }

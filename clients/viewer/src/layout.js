@@ -5,6 +5,9 @@ import { text as textOf } from "./text.js";
 const WIDTH_MIN = 260; // pixels between panels that the organ needs
 const NARROW = 640; // pixels: on a narrower page the panels lie below the organ, as in style.css
 const MARGIN = 18; // pixels beside a panel
+/** panels of each side */
+const LEFT = ["accuracy-panel", "sculpt"];
+const RIGHT = ["panel"];
 
 export class Layout {
     /** the stage is set when it exists @type {import("./stage.js").Stage | null} */
@@ -14,23 +17,37 @@ export class Layout {
     noticeTimer = 0; // 0: the notice stays
 
     /**
-     * The organ and its labels stand between the panels if these leave enough room. During a drag they stay where they
-     * are: the tool's target would move.
+     * The organ and its labels stand in what panels leave free: between them, or above them on a narrow page. During a
+     * drag they stay where they are: the tool's target would move.
      * @param {boolean} dragging
      */
     place(dragging) {
         this.pending = dragging;
         if (dragging) return;
-        const covered = (/** @type {string[]} */ ids) =>
-            Math.max(0, ...ids.map((id) => htmlById(id).offsetWidth && htmlById(id).offsetWidth + MARGIN));
-        const widths = [covered(["accuracy-panel", "sculpt"]), covered(["panel"])];
-        const fits = innerWidth > NARROW && innerWidth - widths[0] - widths[1] >= WIDTH_MIN;
-        const [left, right] = fits ? widths : [0, 0];
+        const { left, right, bottom } = this.covered();
         const style = document.documentElement.style;
         style.setProperty("--left", `${left}px`);
         style.setProperty("--middle", `calc(50% + ${(left - right) / 2}px)`);
         style.setProperty("--free", `calc(100vw - ${left + right}px)`);
-        this.stage?.setMargins(left, right);
+        this.stage?.setMargins(left, right, bottom);
+    }
+
+    /** what panels cover at each side, pixels @returns {{left: number, right: number, bottom: number}} */
+    covered() {
+        const across = innerWidth <= NARROW && innerHeight > innerWidth; // as in panels.css
+        const size = (/** @type {string} */ id) => {
+            const { width, top } = htmlById(id).getBoundingClientRect();
+            return width && (across ? innerHeight - top : width + MARGIN);
+        };
+        const [left, right] = [Math.max(...LEFT.map(size)), Math.max(...RIGHT.map(size))];
+        return across ? { left: 0, right: 0, bottom: Math.max(left, right) } : { left, right, bottom: 0 };
+    }
+
+    /** does the organ have room beside all panels? Else they are shown one at a time */
+    hasRoom() {
+        const { left, right } = this.covered();
+        const across = innerWidth <= NARROW && innerHeight > innerWidth;
+        return !across && innerWidth - left - right >= WIDTH_MIN;
     }
 
     /** @param {string} text empty hides it @param {number} ms the notice disappears after this time; 0: it stays */

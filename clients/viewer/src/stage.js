@@ -84,7 +84,7 @@ export class Stage {
         this.scene.add(this.key, this.rim, this.fill, new THREE.HemisphereLight(0xdfe9f2, 0x4a332b, 1.15));
         this.scene.environment = makeStudio(this.renderer);
         this.scene.environmentIntensity = 0.8;
-        this.left = this.right = 0; // margins that panels cover, pixels
+        this.left = this.right = this.bottom = 0; // margins that panels cover, pixels
         this.dirty = true;
         const ratio = Math.min(window.devicePixelRatio || 1, 2);
         this.pace = new Pace(RATIO_MIN / ratio, software ? 0.6 / ratio : 1);
@@ -112,8 +112,11 @@ export class Stage {
 
     /** distance of the initial view, which a narrow page increases */
     homeDistance() {
-        const narrow = Math.max(0.5, Math.min(1, this.camera.aspect));
-        return ((0.5 / HOME_SHARE) * this.size) / Math.tan((this.camera.fov * Math.PI) / 360) / narrow;
+        return ((0.5 / HOME_SHARE) * this.size) / Math.tan((this.camera.fov * Math.PI) / 360) / this.narrow();
+    }
+
+    narrow() {
+        return Math.max(0.5, Math.min(1, this.camera.aspect));
     }
 
     home() {
@@ -139,24 +142,22 @@ export class Stage {
 
     /**
      * The scene stands in the middle of what panels leave free, and fits there.
-     * @param {number} left @param {number} right covered margins, pixels
+     * @param {number} left @param {number} right @param {number} bottom covered margins, pixels
      */
-    setMargins(left, right) {
-        if (left === this.left && right === this.right) return;
-        this.left = left;
-        this.right = right;
+    setMargins(left, right, bottom) {
+        if (left === this.left && right === this.right && bottom === this.bottom) return;
+        Object.assign(this, { left, right, bottom });
         this.updateProjection();
     }
 
     updateProjection() {
         const width = this.canvas.clientWidth || 1;
         const height = this.canvas.clientHeight || 1;
-        const covered = this.left + this.right;
-        this.camera.zoom = covered
-            ? Math.max(ZOOM_MIN, Math.min(1, (width - covered) / Math.min(width, HOME_SHARE * height)))
-            : 1;
-        if (this.left === this.right) this.camera.clearViewOffset();
-        else this.camera.setViewOffset(width, height, (this.right - this.left) / 2, 0, width, height);
+        const drawn = HOME_SHARE * height * this.narrow(); // diagonal of the scene in the first view
+        const fits = [1, (width - this.left - this.right) / Math.min(width, drawn), (height - this.bottom) / drawn];
+        this.camera.zoom = Math.max(ZOOM_MIN, Math.min(...fits));
+        if (this.left === this.right && !this.bottom) this.camera.clearViewOffset();
+        else this.camera.setViewOffset(width, height, (this.right - this.left) / 2, this.bottom / 2, width, height);
         this.camera.updateProjectionMatrix();
         this.dirty = true;
     }

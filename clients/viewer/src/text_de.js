@@ -155,6 +155,7 @@ export const GERMAN = {
     "help.wheel_press.does": "drückt tiefer oder weniger",
     "hint.drag": "Ziehen Sie am Organ, um es zu bewegen. Ziehen Sie daneben, um sich umzusehen.",
     "hint.full": "Alle Instrumente sind vergeben. Sie sehen zu und bekommen das nächste, das frei wird.",
+    "hint.keys": "Pfeiltasten bewegen das Instrument, Bild auf und Bild ab heben und senken es, Escape lässt los.",
     "hint.muted": "Eine Lehrkraft lässt Sie nur zusehen. Ziehen Sie, um sich umzusehen.",
     "hint.recording": "Das ist eine Aufzeichnung. Ziehen Sie, um sich umzusehen.",
     "hint.watching": "Sie sehen zu. Ziehen Sie, um sich umzusehen.",

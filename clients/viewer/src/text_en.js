@@ -154,6 +154,7 @@ export const ENGLISH = {
     "help.wheel_press.does": "press deeper, or less",
     "hint.drag": "Drag the organ to pull it. Drag beside it to look around.",
     "hint.full": "All tools are in use. You are watching; you get a tool as soon as one is free.",
+    "hint.keys": "Arrow keys move the tool, Page Up and Page Down lift and lower it, Escape lets go.",
     "hint.muted": "An instructor lets you watch only. Drag to look around.",
     "hint.recording": "This is a recording. Drag to look around.",
     "hint.watching": "You are watching. Drag to look around.",

@@ -31,6 +31,8 @@ export class ToolInput {
         this.pointers = new Map();
         /** @type {{id: number, grasp: boolean, plane: THREE.Plane, into: THREE.Vector3, start: number, depth: number, deeper: number, x: number, y: number} | null} */
         this.drag = null;
+        /** @type {ToolTarget} where the keyboard holds the tool */
+        this.held = null;
         this.onFirstDrag = () => {};
         const c = stage.canvas;
         c.addEventListener("pointerdown", (e) => this.down(e));
@@ -65,6 +67,7 @@ export class ToolInput {
         const hit = this.enabled && e.button !== 1 ? this.pick(this.stage.ray(e.clientX, e.clientY)) : null;
         c.classList.add("busy");
         if (!hit) return;
+        this.held = null;
         const press = this.mode === "press" || e.button === 2 || e.shiftKey;
         const into = hit.point.clone().sub(this.stage.camera.position).normalize();
         this.drag = {
@@ -135,9 +138,15 @@ export class ToolInput {
         if (this.pointers.size === 0) this.stage.canvas.classList.remove("busy");
     }
 
+    /** by keyboard @param {NonNullable<ToolTarget>} target */
+    hold(target) {
+        this.held = target;
+        this.onTarget(target);
+    }
+
     release() {
-        if (!this.drag) return;
-        this.drag = null;
+        if (!this.drag && !this.held) return;
+        this.drag = this.held = null;
         this.onTarget(null);
     }
 
