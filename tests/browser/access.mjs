@@ -43,14 +43,14 @@ const hidden = (page) =>
                 [top, bottom] = [Math.min(top, p.y), Math.max(bottom, p.y)];
             }
         }
-        let most = Math.max(-left, right - innerWidth, -top, bottom - innerHeight);
+        let far = Math.max(-left, right - innerWidth, -top, bottom - innerHeight);
         for (const panel of document.querySelectorAll("aside:not([hidden])")) {
             const box = panel.getBoundingClientRect();
             const across = Math.min(right, box.right) - Math.max(left, box.left);
             const down = Math.min(bottom, box.bottom) - Math.max(top, box.top);
-            if (across > 0 && down > 0) most = Math.max(most, Math.min(across, down));
+            if (across > 0 && down > 0) far = Math.max(far, Math.min(across, down));
         }
-        return Math.round(most);
+        return Math.round(far);
     });
 
 await run(async () => {

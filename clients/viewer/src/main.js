@@ -27,6 +27,7 @@ import { ToolInput } from "./tool_input.js";
 import { ToolMarks } from "./tool_marks.js";
 
 const FORCE_MIN_N = 0.005; // a smaller force is displayed as 0.00
+const SLOW_NOTICE_MS = 12000;
 const MARK_RADIUS = 0.006; // of the scene's size: smallest drawn radius of a tool
 
 const worker = new Worker(new URL(`./socket_worker.js?lang=${language}`, import.meta.url), { type: "module" });
@@ -100,6 +101,7 @@ function showForce() {
 }
 
 let nDrawn = 0;
+let toldSlow = false; // that this browser draws slowly: once
 let countedAt = performance.now();
 function draw() {
     requestAnimationFrame(draw);
@@ -131,6 +133,13 @@ function draw() {
     }
     if (now - countedAt > 1000) {
         state.figures.fps = (1000 * nDrawn) / (now - countedAt);
+        if (stage.pace.struggles && !toldSlow) {
+            toldSlow = true;
+            layout.notice(
+                text("notice.slow_browser", { n: Math.max(1, Math.round(state.figures.fps)) }),
+                SLOW_NOTICE_MS,
+            );
+        }
         nDrawn = 0;
         countedAt = now;
     }

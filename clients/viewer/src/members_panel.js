@@ -1,12 +1,12 @@
 // Who is here, who did what, and what an instructor may do about it.
 import { buttonById, htmlById } from "./dom.js";
 import { cssColour } from "./plan_panel.js";
-import { text as textOf } from "./text.js";
+import { isTextKey, text as textOf } from "./text.js";
 
 /**
  * @typedef {import("./control_table.js").Member} Member
  * @typedef {{verb: string, target?: string, args: Record<string, number>}} Command
- * @typedef {{id: number, name: string, text: string, at: number}} Order
+ * @typedef {{id: number, name: string, text: string, numbers: string, at: number}} Order numbers: as they were sent
  */
 
 /** what trainees may be let do */
@@ -160,10 +160,20 @@ export class MembersPanel {
 
     /** @param {Extract<import("./control_table.js").ServerMessage, {type: "orders"}>} message */
     takeOrders({ orders }) {
-        for (const { id, name, verb, target, text, age_s } of orders) {
-            const numbers = text?.replace(/\bmember (\d+)/, (_, member) => this.nameOf(Number(member)));
-            const what = [verb.replaceAll("_", " "), target, numbers].filter(Boolean).join(" ");
-            this.orders.unshift({ id, name, text: what, at: this.now() - 1000 * age_s });
+        for (const { id, name, verb, target, text = "", age_s } of orders) {
+            const member = text.match(/\bmember (\d+)/)?.[1];
+            const key = `order.${verb}`;
+            const did = isTextKey(key) ? textOf(key) : verb.replaceAll("_", " ");
+            // a right has no name of its own
+            const what = [did, verb === "allow" ? "" : target, member && this.nameOf(Number(member))];
+            const at = this.now() - 1000 * age_s;
+            this.orders.unshift({
+                id,
+                name,
+                text: what.filter(Boolean).join(" "),
+                numbers: `${target} ${text}`.trim(),
+                at,
+            });
         }
         this.orders.length = Math.min(this.orders.length, ORDERS_SHOWN);
         this.showOrders();
@@ -171,8 +181,8 @@ export class MembersPanel {
 
     showOrders() {
         this.order.replaceChildren(
-            ...this.orders.map(({ name, text, at }) => {
-                const item = document.createElement("li");
+            ...this.orders.map(({ name, text, numbers, at }) => {
+                const item = Object.assign(document.createElement("li"), { title: numbers });
                 const ago = Object.assign(document.createElement("small"), {
                     textContent: ` ${agoText((this.now() - at) / 1000)}`,
                 });

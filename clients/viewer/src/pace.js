@@ -4,6 +4,8 @@ const FAST_MS = 10; // a picture that costs no more needs no pause: 60 per secon
 const SLOW_MS = 28; // pictures that cost more are drawn at a lower resolution
 const SLOW_RUN = 3;
 const FAST_RUN = 90; // pictures in a row before a change: a single slow one compiles a shader
+const STRUGGLE_MS = 100; // pictures that cost more even at the lowest resolution: with their pauses fewer than 5 a second
+const STRUGGLE_RUN = 8;
 const PAUSE_MAX_MS = 700; // after a picture that took seconds, as the first one
 const LOST_MS = 3000; // a picture without a signal of its end counts as finished after this
 
@@ -14,6 +16,9 @@ export class Pace {
     restUntil = 0;
     slow = 0;
     fast = 0;
+    slowest = 0; // pictures in a row that struggle
+    /** this browser has drawn too slowly at every resolution */
+    struggles = false;
 
     /** @param {number} min resolution @param {number} resolution initial, 1: all pixels of the screen */
     constructor(min, resolution = 1) {
@@ -39,6 +44,8 @@ export class Pace {
         this.restUntil = this.costMs > FAST_MS ? now + Math.min(this.costMs, PAUSE_MAX_MS) : now;
         this.slow = this.costMs > SLOW_MS ? this.slow + 1 : 0;
         this.fast = this.costMs < FAST_MS / 2 ? this.fast + 1 : 0;
+        this.slowest = this.costMs > STRUGGLE_MS && this.resolution <= this.min ? this.slowest + 1 : 0;
+        this.struggles ||= this.slowest >= STRUGGLE_RUN;
         const before = this.resolution;
         // the cost is about proportional to the number of pixels
         if (this.slow >= SLOW_RUN) this.resolution *= Math.max(0.5, Math.min(0.85, Math.sqrt(SLOW_MS / this.costMs)));

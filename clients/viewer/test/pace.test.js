@@ -78,3 +78,19 @@ test("a picture waits for the end of the one before, at most 3 s", () => {
     assert.equal(pace.ready(2000), false);
     assert.equal(pace.ready(3200), true);
 });
+
+test("a browser that struggles at its lowest resolution is found, a slow picture alone is none", () => {
+    const pace = new Pace(0.4, 1);
+    let now = 0;
+    const draw = (/** @type {number} */ ms) => {
+        pace.begin(now);
+        pace.done((now += ms));
+        now += 1000;
+    };
+    draw(2000);
+    for (let i = 0; i < 5; i++) draw(8);
+    for (let i = 0; i < 7; i++) draw(150);
+    assert.equal(pace.struggles, false, "the resolution falls first");
+    for (let i = 0; i < 20; i++) draw(150);
+    assert.equal(pace.struggles, true);
+});
