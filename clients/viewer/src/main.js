@@ -63,6 +63,7 @@ const input = new ToolInput(
         stage.dirty = true;
         poses.send(true);
     },
+    (tip) => marks.hand(state.ownTool, tip),
 );
 input.onClick = (/** @type {number[]} */ position) => sculpt.click(position);
 input.onFirstDrag = () => htmlById("hint").classList.add("gone");
@@ -112,6 +113,7 @@ function draw() {
             nDrawn++;
         }
         for (const body of state.bodies.values()) if (body.colours.blend(now)) stage.dirty = true;
+        if (marks.turning) stage.dirty = true;
         if (stage.dirty || others.moving(now)) {
             const own = state.plays ? -1 : state.ownTool;
             marks.drawn = state.tools;
@@ -121,6 +123,7 @@ function draw() {
                     state.members.get(id)?.name ?? (state.plays ? (state.hello?.tools[tool]?.name ?? "") : ""),
                 own,
                 MARK_RADIUS * stage.size,
+                now,
             );
             stage.draw();
             bodies.disposeRetired();

@@ -9,7 +9,7 @@ const tool = (changes) =>
 
 test("the own tool does not wait for the round trip", () => {
     const tools = [tool({}), tool({ position: [4, 5, 6] })];
-    const drawn = withOwnTool(tools, 1, [7, 8, 9]);
+    const drawn = withOwnTool(tools, 1, { position: [7, 8, 9], quaternion: [0, 1, 0, 0] });
     assert.deepEqual(
         drawn.map((t) => t.position),
         [
@@ -18,11 +18,12 @@ test("the own tool does not wait for the round trip", () => {
         ],
     );
     assert.deepEqual(drawn[1].force, [0, 0, 1]);
+    assert.deepEqual(drawn[1].quaternion, [0, 1, 0, 0]);
     assert.deepEqual(tools[1].position, [4, 5, 6]);
 });
 
 test("a tool that is away, not held or not one's own stays as the server says", () => {
     const tools = [tool({ away: true }), tool({ held: false })];
-    for (const own of [-1, 0, 1]) assert.equal(withOwnTool(tools, own, [7, 8, 9]), tools);
+    for (const own of [-1, 0, 1]) assert.equal(withOwnTool(tools, own, { position: [7, 8, 9] }), tools);
     assert.equal(withOwnTool([tool({})], 0, null)[0].position[0], 1);
 });
