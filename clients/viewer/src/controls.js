@@ -3,6 +3,8 @@ import { buttonById, byId, chooseByArrows, htmlById, markRadio } from "./dom.js"
 import { keyMap } from "./keys.js";
 import { text } from "./text.js";
 
+const ROLL_RAD = Math.PI / 12; // turn of the instrument for a key press
+
 /** @typedef {"pull" | "press" | "sculpt"} Mode what a drag does */
 
 /**
@@ -33,7 +35,7 @@ export class Controls {
     }
 
     addKeys() {
-        const { accuracy, fields, sculpt, stage } = this.page;
+        const { accuracy, fields, input, sculpt, stage } = this.page;
         const actionOf = keyMap(
             {
                 1: () => this.setMode("pull"),
@@ -45,6 +47,8 @@ export class Controls {
                 p: () => this.togglePanel(),
                 c: () => fields.chooseNext(),
                 m: () => this.toggleMesh(),
+                q: () => input.roll(-ROLL_RAD),
+                e: () => input.roll(ROLL_RAD),
                 "?": () => this.openHelp(),
                 f1: () => this.openHelp(),
             },

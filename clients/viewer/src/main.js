@@ -13,7 +13,7 @@ import { Layout } from "./layout.js";
 import { MembersPanel } from "./members_panel.js";
 import { Messages } from "./messages.js";
 import { OtherTools } from "./other_tools.js";
-import { withOwnTool } from "./own_tool.js";
+import { pressDepth, withOwnTool } from "./own_tool.js";
 import { PlanPanel } from "./plan_panel.js";
 import { PlaybackBar } from "./playback_bar.js";
 import { PoseSender } from "./pose_sender.js";
@@ -108,6 +108,7 @@ function draw() {
     poses.send(false);
     const now = performance.now();
     if (stage.ready()) {
+        marks.depth = pressDepth(input.drag, state.ownToolState());
         if (bodies.applyFrames()) {
             stage.dirty = true;
             nDrawn++;

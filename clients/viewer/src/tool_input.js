@@ -4,7 +4,7 @@ import * as THREE from "./three.js";
 /**
  * What a drag asks of the tool: position in m, grasp, and the hand that turns its instrument (null: a ball); null:
  * lifted away.
- * @typedef {{position: number[], grasp: boolean, hand: import("./instrument_pose.js").Hand | null} | null} ToolTarget
+ * @typedef {{position: number[], grasp: boolean, hand?: import("./instrument_pose.js").Hand | null} | null} ToolTarget
  */
 
 const CLICK_PX = 6; // a longer motion is not a click but turns the view
@@ -32,7 +32,7 @@ export class ToolInput {
         this.radius = 0.01;
         /** @type {Map<number, {x: number, y: number}>} */
         this.pointers = new Map();
-        /** @type {{id: number, grasp: boolean, hand: import("./instrument_pose.js").Hand | null, plane: THREE.Plane, into: THREE.Vector3, start: number, depth: number, deeper: number, x: number, y: number} | null} */
+        /** @type {{id: number, grasp: boolean, hand: import("./instrument_pose.js").Hand | null, plane: THREE.Plane, into: THREE.Vector3, at: THREE.Vector3, start: number, depth: number, deeper: number, x: number, y: number} | null} */
         this.drag = null;
         this.onFirstDrag = () => {};
         const c = stage.canvas;
@@ -75,6 +75,7 @@ export class ToolInput {
             grasp: !press,
             hand: this.handAt(hit.point),
             into,
+            at: hit.point,
             start: performance.now(),
             depth: press ? 1.3 * this.radius : 0,
             deeper: 0,
@@ -153,6 +154,13 @@ export class ToolInput {
             this.drag.deeper -= amount * 1e-4 * this.stage.size;
             this.tick();
         } else this.stage.zoom(Math.exp(amount * 0.0012));
+    }
+
+    /** turns the instrument about its shaft @param {number} angle rad */
+    roll(angle) {
+        if (!this.drag?.hand) return;
+        this.drag.hand = { ...this.drag.hand, roll: this.drag.hand.roll + angle };
+        this.tick();
     }
 
     /** updates the target; also called while the pointer rests, because a press deepens over time */

@@ -4,6 +4,7 @@ import { aim, handAt, isOriented } from "./instrument_pose.js";
 import { shapeOf } from "./instrument_shapes.js";
 import { Instrument } from "./instruments.js";
 import { cssColour } from "./plan_panel.js";
+import { text } from "./text.js";
 import * as THREE from "./three.js";
 
 const SAME_N = 0.005; // forces that differ by less have the same arrow
@@ -46,6 +47,7 @@ export class ToolMarks {
         this.marks = [];
         /** @type {import("./instruments.js").ToolInfo[]} */
         this.infos = [];
+        this.depth = 0; // of the own press, m; shown beside the own tool
         this.port = [0, 0, 1]; // of instruments without orientation and trocar, m
         /** @type {Tool[]} as last drawn */
         this.drawn = [];
@@ -160,7 +162,7 @@ export class ToolMarks {
                 mark.arrow.setLength(length, 0.25 * length, 0.12 * length);
                 mark.arrow.setColor(tool.colour);
             }
-            mark.label.textContent = i === mine ? "you" : nameOf(tool.holder, i);
+            mark.label.textContent = i === mine ? this.ownLabel() : nameOf(tool.holder, i);
             mark.label.style.setProperty("--who", cssColour(tool.colour));
         });
         for (let i = tools.length; i < this.marks.length; i++) {
@@ -174,6 +176,11 @@ export class ToolMarks {
         if (isOriented(tool.quaternion)) return tool.quaternion;
         const port = this.infos[index]?.trocar_m ?? this.port;
         return aim(handAt(port, tool.position, this.stage.up.toArray()), tool.position);
+    }
+
+    ownLabel() {
+        const mm = Math.round(1000 * this.depth);
+        return mm > 0 ? text("tool.deep", { mm }) : text("tool.you");
     }
 
     /** after the camera has moved */
