@@ -523,6 +523,8 @@ static void a_bare_surface_becomes_a_scene_of_about_13000_tets(void)
     CHECK_TEXT(s->title, "Ball \xc3\xa9 7");
     CHECK_TEXT(s->source, "Ball \xc3\xa9 7.obj");
     CHECK_INT(s->n_tool, 3);
+    CHECK_TEXT(s->tool[0].name, "grasper");
+    CHECK(s->tool[0].instrument == PAL_INSTRUMENT_GRASPER && s->tool[1].instrument == PAL_INSTRUMENT_RETRACTOR);
     CHECK_INT(s->body[0].n_support, 1);
     CHECK(hash_after(s, 2) != 0);
     pal_scene_free(loaded);

@@ -158,6 +158,6 @@ inputById("name").onchange = () => {
     connect();
 };
 // read-only access for tests and for the console
-Object.defineProperty(window, "palpate", { value: { state, stage, input, accuracy } });
+Object.defineProperty(window, "palpate", { value: { state, stage, input, marks, accuracy } });
 connect();
 draw();
