@@ -99,7 +99,10 @@ typedef struct pal_wire_topology {
 typedef struct pal_wire_tool_info {
     char name[PAL_WIRE_NAME_BYTES]; /* e.g. "probe" */
     double radius_m;
-    double force_cap_N; /* largest force that it exerts and feels; 0: unknown, and not on the wire */
+    double force_cap_N;                   /* largest force that it exerts and feels; 0: unknown, and not on the wire */
+    char instrument[PAL_WIRE_NAME_BYTES]; /* drawn for it: "grasper" ...; "": a ball, and not on the wire */
+    uint32_t n_trocar;                    /* 3, or 0: none, and not on the wire */
+    double trocar_m[3];                   /* the point that its shaft passes */
 } pal_wire_tool_info;
 /* what happened in a recording that the session plays */
 typedef struct pal_wire_mark {

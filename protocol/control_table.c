@@ -22,6 +22,8 @@ static const pal_control_field part_fields[] = {{"name", TEXT, true, ONE(part_in
 static const pal_control_field tool_fields[] = {{"name", TEXT, true, ONE(tool_info, name)},
                                                 {"radius_m", F64, true, ONE(tool_info, radius_m)},
                                                 {"force_cap_N", F64, false, ONE(tool_info, force_cap_N)},
+                                                {"instrument", TEXT_OR_EMPTY, false, ONE(tool_info, instrument)},
+                                                {"trocar_m", NUMBERS, false, LIST(tool_info, trocar_m, n_trocar), NULL},
                                                 {0}};
 static const pal_control_field mark_fields[] = {
     {"time_s", F64, true, ONE(mark, time_s)}, {"text", TEXT, true, ONE(mark, text)}, {0}};

@@ -465,6 +465,14 @@ void pal_stream_measure(pal_stream *stream, uint64_t now_ns)
     stream->rate_ns = now_ns;
 }
 
+static void put_instrument(pal_wire_tool_info *out, const pal_tool_def *tool)
+{
+    if (tool->instrument != PAL_INSTRUMENT_BALL)
+        pal_plain_text(out->instrument, sizeof out->instrument, pal_instrument_names[tool->instrument]);
+    out->n_trocar = tool->has_trocar ? 3 : 0;
+    memcpy(out->trocar_m, tool->trocar_m, sizeof out->trocar_m);
+}
+
 void pal_stream_hello(const pal_stream *stream, pal_wire_hello *out)
 {
     const pal_scene *scene = stream->scene;
@@ -490,6 +498,7 @@ void pal_stream_hello(const pal_stream *stream, pal_wire_hello *out)
         pal_plain_text(out->tool[t].name, sizeof out->tool[t].name, scene->tool[t].name);
         /* the world's radius when a frame gives it, else the default of pal_tool_def */
         out->tool[t].force_cap_N = scene->tool[t].force_cap_N;
+        put_instrument(&out->tool[t], &scene->tool[t]);
         out->tool[t].radius_m = stream->frame && t < stream->frame->n_tool ? stream->frame->tool[t].radius_m
                                 : scene->tool[t].radius_m > 0              ? scene->tool[t].radius_m
                                                                            : 0.04 * sqrt(size);

@@ -9,7 +9,9 @@
 #include "server/scene/scene_import.h"
 #include "server/scene/scene_keys.h"
 #include "server/scene/subdivision_file.h"
+#include "server/scene/tuning.h"
 
+#include <math.h>
 #include <stdio.h>
 
 enum { FOLDER = 1024 };
@@ -178,6 +180,28 @@ static pal_err read_body(const pal_json *at, int index, pal_loaded_scene *scene)
     return pal_region_read(at, scene, index);
 }
 
+/* what is drawn for a tool: its instrument and the point that its shaft passes */
+static pal_err read_instrument(const pal_json *at, pal_tool_def *tool)
+{
+    char word[PAL_NAME], known[128];
+    int k = 0;
+    snprintf(word, sizeof word, "%s", pal_instrument_names[tool->instrument]);
+    PAL_TRY(pal_json_text(at, "instrument", false, word, sizeof word));
+    while (k < PAL_INSTRUMENT_COUNT && strcmp(word, pal_instrument_names[k])) k++;
+    if (k == PAL_INSTRUMENT_COUNT) {
+        pal_json_list_words(pal_instrument_names, "", known, sizeof known);
+        return pal_json_refuse_key(at, "instrument", "\"%s\" is no instrument; known are %s", word, known);
+    }
+    tool->instrument = (pal_instrument)k;
+    PAL_TRY(pal_json_vector(at, "trocar_m", tool->trocar_m));
+    tool->has_trocar = pal_json_has(at, "trocar_m");
+    for (int c = 0; c < 3; c++)
+        if (fabs(tool->trocar_m[c]) > PAL_TROCAR_MAX_M)
+            return pal_json_refuse_key(at, "trocar_m", "%g is outside %g .. %g", tool->trocar_m[c], -PAL_TROCAR_MAX_M,
+                                       PAL_TROCAR_MAX_M);
+    return PAL_ERR_OK;
+}
+
 static pal_err read_tools(const pal_json *root, pal_scene *scene)
 {
     pal_json list;
@@ -188,7 +212,8 @@ static pal_err read_tools(const pal_json *root, pal_scene *scene)
         PAL_TRY(pal_json_object(&at, pal_scene_keys(PAL_KEYS_TOOL, NULL)));
         PAL_TRY(pal_json_text(&at, "name", false, tool->name, sizeof tool->name));
         PAL_TRY(pal_json_number(&at, "radius_m", 0, 1, &tool->radius_m));
-        PAL_TRY(pal_json_number(&at, "force_cap_N", 1e-3, 1000, &tool++->force_cap_N));
+        PAL_TRY(pal_json_number(&at, "force_cap_N", 1e-3, 1000, &tool->force_cap_N));
+        PAL_TRY(read_instrument(&at, tool++));
     }
     return PAL_ERR_OK;
 }

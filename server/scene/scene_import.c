@@ -282,6 +282,20 @@ static pal_err hold_an_eighth(const pal_cells *cells, const double up[3], double
     return PAL_ERR_OK;
 }
 
+/* on an organ the first hand grasps, the second retracts, the third palpates; clay is touched with balls */
+static void lay_out_tools(pal_scene *scene, double radius_m)
+{
+    static const pal_instrument instrument[] = {PAL_INSTRUMENT_GRASPER, PAL_INSTRUMENT_RETRACTOR, PAL_INSTRUMENT_PROBE};
+    pal_tools_default(scene, (int)(sizeof instrument / sizeof instrument[0]));
+    for (int t = 0; t < scene->n_tool; t++) {
+        pal_tool_def *tool = &scene->tool[t];
+        tool->radius_m = radius_m;
+        if (scene->body[0].cells) continue;
+        tool->instrument = instrument[t];
+        snprintf(tool->name, sizeof tool->name, "%s", pal_instrument_names[instrument[t]]);
+    }
+}
+
 /* one body with defaults around the prepared mesh in mesh[0], or, where report is NULL, the control cells in cells[0]
  */
 static pal_err make_body(pal_loaded_scene *loaded, const char *name, const pal_surface_scene *options,
@@ -318,9 +332,8 @@ static pal_err make_body(pal_loaded_scene *loaded, const char *name, const pal_s
         body->support[0].fraction = options->hold;
     else if (cells)
         PAL_TRY(hold_an_eighth(cells, scene->up, &body->support[0].fraction));
-    pal_tools_default(scene, 3);
     pal_surface_box(&loaded->mesh[0].surface, low, high);
-    for (int t = 0; t < scene->n_tool; t++) scene->tool[t].radius_m = PAL_TOOL_RADIUS_S * pal_dist3(low, high);
+    lay_out_tools(scene, PAL_TOOL_RADIUS_S * pal_dist3(low, high));
     return pal_scene_check(scene, diag);
 }
 

@@ -3,8 +3,8 @@
 #define PAL_SCENE_SCENE_IMPORT_H
 #include "server/scene/loaded_scene.h"
 
-/* any surface file or label volume -> default scene: material, lowest 5 % held, three tools; with model
- * adaptive_springs the open edges are held in place of the lowest part when there are some and `hold` is 0.
+/* any surface file or label volume -> default scene: material, lowest 5 % held, a grasper, a retractor and a probe;
+ * with model adaptive_springs the open edges are held in place of the lowest part when there are some and `hold` is 0.
  * REFUSED also for a surface that this model cannot take, naming the first offender, BUDGET with both numbers when its
  * levels do not fit into 512 MiB. report may be NULL */
 pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *options, pal_loaded_scene **out,

@@ -101,6 +101,11 @@ static bool gravity_acts(const pal_scene *scene)
     return false;
 }
 
+static cJSON *instrument_json(const pal_tool_def *tool)
+{
+    return tool->instrument ? JSON_TEXT(pal_instrument_names[tool->instrument]) : NULL;
+}
+
 /* the scene as text, or NULL; the caller frees it */
 static char *scene_text(const pal_scene *scene)
 {
@@ -112,9 +117,10 @@ static char *scene_text(const pal_scene *scene)
     for (int k = 0; k < scene->n_body; k++) cJSON_AddItemToArray(bodies, body_json(scene, k));
     for (int k = 0; k < scene->n_tool; k++) {
         const pal_tool_def *tool = &scene->tool[k];
-        cJSON_AddItemToArray(tools,
-                             PAL_JSON({"name", JSON_TEXT(tool->name)}, {"radius_m", pal_json_exact(tool->radius_m)},
-                                      {"force_cap_N", pal_json_exact(tool->force_cap_N)}));
+        cJSON_AddItemToArray(
+            tools, PAL_JSON({"name", JSON_TEXT(tool->name)}, {"radius_m", pal_json_exact(tool->radius_m)},
+                            {"force_cap_N", pal_json_exact(tool->force_cap_N)}, {"instrument", instrument_json(tool)},
+                            {"trocar_m", tool->has_trocar ? pal_json_exact_list(tool->trocar_m, 3) : NULL}));
     }
     cJSON *root = PAL_JSON({"name", JSON_TEXT(scene->name)}, {"title", JSON_TEXT(scene->title)},
                            {"source", JSON_TEXT(scene->source)}, {"accuracy", accuracy}, {"budget", budget},

@@ -28,6 +28,8 @@ enum { PAL_ADAPTIVE_LEVELS = 2 };
 /* J: constants of springs on a grid, any that a double can square */
 #define PAL_GRID_K_MIN_J 1e-60
 #define PAL_GRID_K_MAX_J 1e60
+/* m, of any coordinate of a trocar: no instrument is as long */
+#define PAL_TROCAR_MAX_M 10.0
 /* m, of any coordinate of a problem: a body's frame is single precision on the wire */
 #define PAL_LENGTH_MAX_M 1e9
 #endif

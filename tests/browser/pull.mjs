@@ -20,6 +20,23 @@ import {
     until,
 } from "./common.mjs";
 
+/** share of the picture that an instrument covers: the pixels that change when it is hidden */
+const coverage = (page, index) =>
+    page.evaluate((tool) => {
+        const { marks, stage } = window.palpate;
+        const gl = stage.renderer.getContext();
+        const { width, height } = stage.canvas;
+        const [shown, hidden] = [true, false].map((visible) => {
+            marks.marks[tool].instrument.group.visible = visible;
+            stage.dirty = true;
+            stage.draw();
+            const bytes = new Uint8Array(4 * width * height);
+            gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+            return bytes;
+        });
+        const changed = (_, i) => [0, 1, 2].some((k) => Math.abs(shown[4 * i + k] - hidden[4 * i + k]) > 20);
+        return Array.from({ length: width * height }, changed).filter(Boolean).length / (width * height);
+    }, index);
 const ended = (child) => new Promise((resolve) => child.on("exit", (code) => resolve(code)));
 
 await run(async () => {
@@ -119,6 +136,34 @@ await run(async () => {
         (f) => f > 0.05,
     );
     check("the pulling browser shows the force", force > 0.05 && force < 50, `${force.toFixed(2)} N`);
+    // the first tool of a prepared organ is a grasper; its jaws close over the tissue
+    const grasper = (page) =>
+        page.evaluate((index) => {
+            const { marks, state } = window.palpate;
+            const { ball, instrument } = marks.marks[index];
+            const { position, quaternion } = instrument.group;
+            const tool = state.tools[index];
+            return {
+                shown: instrument.group.visible && !ball.visible,
+                angle: instrument.angle,
+                open: instrument.shape.open,
+                held: instrument.shape.held,
+                apart: Math.hypot(...position.toArray().map((v, k) => v - tool.position[k])),
+                turned: Math.abs(quaternion.w) < 1,
+            };
+        }, holders[0]);
+    const closed = await until(
+        () => grasper(ben),
+        (g) => g.shown && g.angle === g.held && g.apart < 1e-4,
+    );
+    check(
+        "the other member sees a grasper, its jaws closed over the tissue",
+        closed.shown && closed.turned && closed.angle === closed.held && closed.held < 0.2 * closed.open,
+        `${((closed.angle * 180) / Math.PI).toFixed(1)} of ${((closed.open * 180) / Math.PI).toFixed(1)} degrees`,
+    );
+    check("its tip is at the tool", closed.apart < 1e-4, `${(1e6 * closed.apart).toFixed(0)} um`);
+    const covered = await coverage(ben, holders[0]);
+    check("and is drawn", covered > 0.002 && covered < 0.2, `${(100 * covered).toFixed(2)} % of the picture`);
     const label = await until(
         () =>
             ben.evaluate(() =>

@@ -29,6 +29,8 @@ static inline bool small_scene_make(small_scene *s, const char *name)
     s->scene.n_body = 1;
     pal_body_default(&s->scene.body[0], "organ", &s->mesh);
     pal_tools_default(&s->scene, 2);
+    s->scene.tool[0].instrument = PAL_INSTRUMENT_GRASPER;
+    s->scene.tool[0].has_trocar = true, s->scene.tool[0].trocar_m[1] = 0.25;
     return !err;
 }
 #endif

@@ -73,6 +73,9 @@ static void newcomer_gets_hello_members_frame_and_tools_in_this_order(void)
           hello->plan.n_component > 0);
     CHECK(hello->box_max_m[0] > hello->box_min_m[0] && hello->tool[0].radius_m > 0 && hello->credit >= 2);
     CHECK_NEAR(hello->tool[0].force_cap_N, organ.scene.tool[0].force_cap_N, 0);
+    CHECK_TEXT(hello->tool[0].instrument, "grasper");
+    CHECK(hello->tool[0].n_trocar == 3 && hello->tool[0].trocar_m[1] == 0.25);
+    CHECK(!hello->tool[1].instrument[0] && hello->tool[1].n_trocar == 0);
     pal_server_advance(server);
     CHECK_INT(mem_pull(&ada, 1), 1);
     CHECK_INT(ada.n_text[PAL_CONTROL_MEMBERS], 1);

@@ -127,6 +127,11 @@ static void every_bad_scene_has_its_sentence(void)
         {"{\"tools\": [{}, {\"radius\": 1}]}", "tools[1].radius: unknown key"},
         {"{\"tools\": [{\"radius_m\": -1}]}", "tools[0].radius_m: -1 is outside 0 .. 1"},
         {"{\"tools\": [{\"force_cap_N\": 0}]}", "tools[0].force_cap_N: 0 is outside"},
+        {"{\"tools\": [{\"instrument\": \"spoon\"}]}",
+         "tools[0].instrument: \"spoon\" is no instrument; known are ball, probe, grasper, scissors, hook, retractor"},
+        {"{\"tools\": [{\"instrument\": 3}]}", "tools[0].instrument: is not a text"},
+        {"{\"tools\": [{}, {\"trocar_m\": [0, 1]}]}", "tools[1].trocar_m: is not a list of three numbers"},
+        {"{\"tools\": [{\"trocar_m\": [0, 0, 11]}]}", "tools[0].trocar_m: 11 is outside -10 .. 10"},
         {"{\"tools\": [{},{},{},{},{},{},{},{},{}]}", "tools: 9 entries, more than 8"},
         {"{\"bodies\": [{},{},{},{},{},{},{},{},{}]}", "bodies: 9 entries, more than 8"},
     };
@@ -235,6 +240,7 @@ static void absent_keys_take_the_defaults(void)
     CHECK_NEAR(got->gravity_m_s2, want.gravity_m_s2, 0);
     CHECK_INT(got->n_tool, 3);
     CHECK_TEXT(got->tool[2].name, "probe 3");
+    CHECK(got->tool[2].instrument == PAL_INSTRUMENT_BALL && !got->tool[2].has_trocar);
     CHECK_TEXT(got->body[0].name, "body 1");
     CHECK_NEAR(got->body[0].material.young_Pa, 5000, 0);
     CHECK_NEAR(got->body[0].material.damping_1_s, PAL_DAMPING_DERIVED, 0);
@@ -254,7 +260,8 @@ static void given_keys_arrive(void)
         "\"step_s\": 0.002, \"up\": [0, "
         "1, "
         "0], \"gravity_m_s2\": 1.62, \"max_substep\": 77, \"tools\": [{\"name\": \"hook\", \"radius_m\": 0.003, "
-        "\"force_cap_N\": 2}], \"bodies\": [{\"name\": \"a b\", \"mesh\": \"ball.palmesh\", \"material\": "
+        "\"force_cap_N\": 2, \"instrument\": \"hook\", \"trocar_m\": [0.1, 0.2, -0.3]}], \"bodies\": [{\"name\": \"a "
+        "b\", \"mesh\": \"ball.palmesh\", \"material\": "
         "{\"young_Pa\": "
         "9000, \"poisson\": 0.3, \"density_kg_m3\": 1100, \"damping_1_s\": 0}, \"model\": {\"name\": \"tet_springs\", "
         "\"k_distance_J\": 0.5}, \"solver\": {\"name\": \"verlet\"}, \"output\": {\"name\": \"surface_output\"}, "
@@ -278,6 +285,8 @@ static void given_keys_arrive(void)
     CHECK_TEXT(s->tool[0].name, "hook");
     CHECK_NEAR(s->tool[0].radius_m, 0.003, 0);
     CHECK_NEAR(s->tool[0].force_cap_N, 2, 0);
+    CHECK_INT(s->tool[0].instrument, PAL_INSTRUMENT_HOOK);
+    CHECK(s->tool[0].has_trocar && s->tool[0].trocar_m[2] == -0.3);
     CHECK_TEXT(b->name, "a b");
     CHECK_NEAR(b->material.damping_1_s, 0, 0);
     CHECK_TEXT(b->solver.name, "verlet");
@@ -324,6 +333,8 @@ static void a_saved_scene_loads_to_the_same_world_step_by_step(void)
     in->scene = plain;
     in->scene.body[0].material = (pal_material){6543.21, 0.41, 1030, 3, 0};
     in->scene.tool[0].radius_m = 0.1 / 3;
+    in->scene.tool[0].instrument = PAL_INSTRUMENT_SCISSORS;
+    in->scene.tool[0].has_trocar = true, in->scene.tool[0].trocar_m[1] = 0.1 / 7;
     pal_entry_put_number(&in->scene.body[0].model, "k_distance_J", 0.1 / 7, NULL);
     in->scene.body[0].n_support = 2;
     in->scene.body[0].support[1] = (pal_support_def){.low_m = {-1, -1, -1}, .high_m = {-0.04, 1, 1}};
@@ -338,6 +349,9 @@ static void a_saved_scene_loads_to_the_same_world_step_by_step(void)
     CHECK(before != 0);
     CHECK(hash_after(&out->scene, CHECK_REPEATS(100, 20)) == before);
     CHECK_TEXT(out->scene.title, in->scene.title);
+    CHECK_INT(out->scene.tool[0].instrument, PAL_INSTRUMENT_SCISSORS);
+    CHECK(out->scene.tool[0].has_trocar && !out->scene.tool[1].has_trocar);
+    CHECK_NEAR(out->scene.tool[0].trocar_m[1], 0.1 / 7, 0);
     CHECK_NEAR(out->scene.body[0].material.damping_1_s, 3, 0);
     /* a damping that is derived stays one */
     pal_scene_free(out);
@@ -509,6 +523,8 @@ static void a_bare_surface_becomes_a_scene_of_about_13000_tets(void)
     CHECK_TEXT(s->title, "Ball \xc3\xa9 7");
     CHECK_TEXT(s->source, "Ball \xc3\xa9 7.obj");
     CHECK_INT(s->n_tool, 3);
+    CHECK_TEXT(s->tool[0].name, "grasper");
+    CHECK(s->tool[0].instrument == PAL_INSTRUMENT_GRASPER && s->tool[1].instrument == PAL_INSTRUMENT_RETRACTOR);
     CHECK_INT(s->body[0].n_support, 1);
     CHECK(hash_after(s, 2) != 0);
     pal_scene_free(loaded);

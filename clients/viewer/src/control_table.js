@@ -42,7 +42,15 @@ export const SERVER_MESSAGES = Object.freeze(
             box_max_m: "vector",
             up: "vector",
             parts: [part],
-            tools: [{ name: "text", radius_m: "f64", "force_cap_N?": "f64" }],
+            tools: [
+                {
+                    name: "text",
+                    radius_m: "f64",
+                    "force_cap_N?": "f64",
+                    "instrument?": "text",
+                    "trocar_m?": "numbers",
+                },
+            ],
             components: "texts",
             "component_parts?": "numbers",
             "component_reasons?": "texts",

@@ -5,6 +5,7 @@ import { keyMap } from "./keys.js";
 import { text } from "./text.js";
 
 const KEYS_MS = 8000; // how long the keys that move the tool are named
+const ROLL_RAD = Math.PI / 12; // turn of the instrument for a key press
 
 /** @typedef {"pull" | "press" | "sculpt"} Mode what a drag does */
 
@@ -52,6 +53,8 @@ export class Controls {
                 p: () => this.togglePanel(),
                 c: () => fields.chooseNext(),
                 m: () => this.toggleMesh(),
+                q: () => input.roll(-ROLL_RAD),
+                w: () => input.roll(ROLL_RAD),
                 "?": () => this.openHelp(),
                 f1: () => this.openHelp(),
                 escape: () => this.closePanels(),

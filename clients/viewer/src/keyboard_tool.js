@@ -68,7 +68,8 @@ export class KeyboardTool {
             if (!hit) continue;
             // a press begins outside
             if (input.mode === "press") hit.point.addScaledVector(hit.normal, input.radius);
-            input.hold({ position: hit.point.toArray(), grasp: input.mode !== "press" });
+            const hand = input.handAt(hit.point);
+            input.hold({ position: hit.point.toArray(), grasp: input.mode !== "press", hand });
             this.onBegin();
             return true;
         }

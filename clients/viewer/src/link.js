@@ -40,8 +40,8 @@ const FINAL = new Map([
  * @typedef {import("./control_table.js").ClientMessage} ClientMessage
  * @typedef {import("./topology_delta.js").Shown} Shown
  * @typedef {"connecting" | "live" | "lost" | "refused"} ConnectionState
- * @typedef {{tool: number, position: number[] | null, grasp: boolean, away: boolean}} ToolPose position m; away: the
- *   tool is lifted out of the scene
+ * @typedef {{tool: number, position: number[] | null, quaternion?: number[], grasp: boolean, away: boolean}} ToolPose
+ *   position m; quaternion w x y z, absent: unknown; away: the tool is lifted out of the scene
  * @typedef {{positions: Float32Array<ArrayBuffer>, normals: Float32Array<ArrayBuffer>}} FrameArrays [n][3] each
  * @typedef {{latency_ms: number, rtt_ms: number, decode_ms: number, bytes_s: number}} LinkFigures
  */
@@ -254,6 +254,7 @@ export class Link {
                 flags: POSE_FLAG.POSE_ONLY | (pose.away ? POSE_FLAG.AWAY : 0),
                 stampUs: Math.round(this.env.now() * 1000),
                 position: this.lastPosition,
+                quaternion: pose.quaternion,
                 buttons: pose.grasp ? 1 : 0,
             }),
         );

@@ -13,7 +13,7 @@ import { Layout } from "./layout.js";
 import { MembersPanel } from "./members_panel.js";
 import { Messages } from "./messages.js";
 import { OtherTools } from "./other_tools.js";
-import { withOwnTool } from "./own_tool.js";
+import { pressDepth, withOwnTool } from "./own_tool.js";
 import { PlanPanel } from "./plan_panel.js";
 import { PlaybackBar } from "./playback_bar.js";
 import { PoseSender } from "./pose_sender.js";
@@ -64,6 +64,7 @@ const input = new ToolInput(
         stage.dirty = true;
         poses.send(true);
     },
+    (tip) => marks.hand(state.ownTool, tip),
 );
 input.onClick = (/** @type {number[]} */ position) => sculpt.click(position);
 input.onFirstDrag = () => htmlById("hint").classList.add("gone");
@@ -109,11 +110,13 @@ function draw() {
     poses.send(false);
     const now = performance.now();
     if (stage.ready()) {
+        marks.depth = pressDepth(input.drag, state.ownToolState());
         if (bodies.applyFrames()) {
             stage.dirty = true;
             nDrawn++;
         }
         for (const body of state.bodies.values()) if (body.colours.blend(now)) stage.dirty = true;
+        if (marks.turning) stage.dirty = true;
         if (stage.dirty || others.moving(now)) {
             const own = state.plays ? -1 : state.ownTool;
             marks.drawn = state.tools;
@@ -123,6 +126,7 @@ function draw() {
                     state.members.get(id)?.name ?? (state.plays ? (state.hello?.tools[tool]?.name ?? "") : ""),
                 own,
                 MARK_RADIUS * stage.size,
+                now,
             );
             stage.draw();
             bodies.disposeRetired();
@@ -163,6 +167,6 @@ inputById("name").onchange = () => {
     connect();
 };
 // read-only access for tests and for the console
-Object.defineProperty(window, "palpate", { value: { state, stage, input, accuracy } });
+Object.defineProperty(window, "palpate", { value: { state, stage, input, marks, accuracy } });
 connect();
 draw();

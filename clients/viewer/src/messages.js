@@ -108,7 +108,7 @@ export class Messages {
 
     /** @param {Of<"hello">} message */
     hello(message) {
-        const { accuracy, bodies, controls, fields, input, sculpt, stage, state } = this.page;
+        const { accuracy, bodies, controls, fields, input, marks, sculpt, stage, state } = this.page;
         const scene = (/** @type {import("./app_state.js").Hello | null} */ h) =>
             [h?.session, h?.box_min_m, h?.box_max_m, h?.up].join();
         const sameScene = scene(state.hello) === scene(message);
@@ -119,6 +119,7 @@ export class Messages {
         state.ownTool = message.you.tool ?? -1;
         if (!sameScene) stage.frameBox([message.box_min_m, message.box_max_m], message.up);
         input.radius = message.tools[Math.max(0, state.ownTool)]?.radius_m ?? RADIUS_SHARE * stage.size;
+        marks.begin(message);
         bodies.truncate(message.parts.length);
         this.page.members.begin();
         this.pausedBy = "";

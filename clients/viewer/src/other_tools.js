@@ -1,4 +1,5 @@
 // The tools of others as they are drawn: the network delivers their positions unevenly, and a hand does not jump.
+import { mixed } from "./instrument_pose.js";
 
 /** @typedef {import("./wire.js").Tool} Tool */
 
@@ -16,7 +17,7 @@ export class OtherTools {
     constructor() {
         /** @type {Tool[]} of the newest message */
         this.tools = [];
-        /** @type {number[][]} where each was drawn when that came */
+        /** @type {Tool[]} as each was drawn when that came */
         this.from = [];
         this.takenAt = -Infinity;
         this.apart = 1000 / 60;
@@ -28,7 +29,7 @@ export class OtherTools {
         const apart = now - this.takenAt;
         if (apart < APART_MAX_MS) this.apart += SHARE * (apart - this.apart);
         this.takenAt = now;
-        this.from = tools.map((tool, i) => (isThere(tool) && isThere(drawn[i]) ? drawn[i] : tool).position);
+        this.from = tools.map((tool, i) => (isThere(tool) && isThere(drawn[i]) ? drawn[i] : tool));
         this.tools = tools;
     }
 
@@ -42,7 +43,12 @@ export class OtherTools {
         const share = Math.min(1, Math.max(0, (now - this.takenAt) / this.apart));
         return this.tools.map((tool, i) => {
             if (!isThere(tool) || share === 1) return tool;
-            return { ...tool, position: tool.position.map((v, k) => this.from[i][k] + share * (v - this.from[i][k])) };
+            const { position, quaternion } = this.from[i];
+            return {
+                ...tool,
+                position: tool.position.map((v, k) => position[k] + share * (v - position[k])),
+                quaternion: mixed(quaternion, tool.quaternion, share),
+            };
         });
     }
 }

@@ -1,4 +1,5 @@
 // Sends the poses of the own tool: at most one per POSE_MS while it moves, one per REST_MS while it rests.
+import { aim } from "./instrument_pose.js";
 
 const POSE_MS = 16;
 const REST_MS = 50; // the server releases a silent tool
@@ -23,7 +24,7 @@ export class PoseSender {
         this.anchor = null;
         this.away = true;
         this.sentAt = 0;
-        /** @type {number[] | null} position of the last pose; null: the tool was away */
+        /** @type {{position: number[], quaternion?: number[]} | null} the last pose; null: the tool was away */
         this.last = null;
         /** the tool has not reached its target yet, because the pointer was faster than a hand */
         this.behind = false;
@@ -36,10 +37,10 @@ export class PoseSender {
     reached(target, now) {
         const { last } = this;
         const speed = Math.max(SPEED_M_S, SPEED_SIZES_S * this.size());
-        const far = last ? Math.hypot(...target.map((v, i) => v - last[i])) : 0;
+        const far = last ? Math.hypot(...target.map((v, i) => v - last.position[i])) : 0;
         const share = (speed * Math.min(now - this.sentAt, REST_MS)) / 1000 / far;
         this.behind = far > 0 && share < 1;
-        return last && this.behind ? last.map((v, i) => v + share * (target[i] - v)) : target;
+        return last && this.behind ? last.position.map((v, i) => v + share * (target[i] - v)) : target;
     }
 
     /**
@@ -67,8 +68,8 @@ export class PoseSender {
             if (!moves && now - this.sentAt < REST_MS) return;
             if (moves && now - this.sentAt < POSE_MS / 2 && !this.away) return;
             const position = this.reached(this.position(target, now), now);
-            this.last = position;
-            this.post({ type: "pose", tool: ownTool, position, grasp: target.grasp, away: false });
+            this.last = { position, ...(target.hand && { quaternion: aim(target.hand, position) }) };
+            this.post({ type: "pose", tool: ownTool, ...this.last, grasp: target.grasp, away: false });
             this.away = false;
             this.sentAt = now;
         } else if (!this.away) {

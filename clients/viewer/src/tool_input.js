@@ -2,8 +2,9 @@
 import * as THREE from "./three.js";
 
 /**
- * What a drag asks of the tool: position in m and grasp; null: lifted away.
- * @typedef {{position: number[], grasp: boolean} | null} ToolTarget
+ * What a drag asks of the tool: position in m, grasp, and the hand that turns its instrument (null: a ball); null:
+ * lifted away.
+ * @typedef {{position: number[], grasp: boolean, hand?: import("./instrument_pose.js").Hand | null} | null} ToolTarget
  */
 
 const CLICK_PX = 6; // a longer motion is not a click but turns the view
@@ -14,11 +15,13 @@ export class ToolInput {
      * @param {import("./stage.js").Stage} stage
      * @param {(ray: THREE.Ray) => import("./picking.js").Hit | null} pick
      * @param {(target: ToolTarget) => void} onTarget called on every change
+     * @param {(tip: THREE.Vector3) => import("./instrument_pose.js").Hand | null} handAt the hand of the own tool
      */
-    constructor(stage, pick, onTarget) {
+    constructor(stage, pick, onTarget, handAt) {
         this.stage = stage;
         this.pick = pick;
         this.onTarget = onTarget;
+        this.handAt = handAt;
         /** @type {import("./controls.js").Mode} */
         this.mode = "pull";
         /** @type {(position: number[]) => void} called with the point that is clicked while sculpting, m */
@@ -29,7 +32,7 @@ export class ToolInput {
         this.radius = 0.01;
         /** @type {Map<number, {x: number, y: number}>} */
         this.pointers = new Map();
-        /** @type {{id: number, grasp: boolean, plane: THREE.Plane, into: THREE.Vector3, start: number, depth: number, deeper: number, x: number, y: number} | null} */
+        /** @type {{id: number, grasp: boolean, hand: import("./instrument_pose.js").Hand | null, plane: THREE.Plane, into: THREE.Vector3, at: THREE.Vector3, start: number, depth: number, deeper: number, x: number, y: number} | null} */
         this.drag = null;
         /** @type {ToolTarget} where the keyboard holds the tool */
         this.held = null;
@@ -73,7 +76,9 @@ export class ToolInput {
         this.drag = {
             id: e.pointerId,
             grasp: !press,
+            hand: this.handAt(hit.point),
             into,
+            at: hit.point,
             start: performance.now(),
             depth: press ? 1.3 * this.radius : 0,
             deeper: 0,
@@ -160,6 +165,13 @@ export class ToolInput {
         } else this.stage.zoom(Math.exp(amount * 0.0012));
     }
 
+    /** turns the instrument about its shaft @param {number} angle rad */
+    roll(angle) {
+        if (!this.drag?.hand) return;
+        this.drag.hand = { ...this.drag.hand, roll: this.drag.hand.roll + angle };
+        this.tick();
+    }
+
     /** updates the target; also called while the pointer rests, because a press deepens over time */
     tick() {
         const drag = this.drag;
@@ -173,6 +185,6 @@ export class ToolInput {
             ? drag.deeper
             : -1.2 * this.radius + (drag.depth + 0.6 * this.radius) * t * t * (3 - 2 * t) + drag.deeper;
         point.addScaledVector(drag.into, depth);
-        this.onTarget({ position: point.toArray(), grasp: drag.grasp });
+        this.onTarget({ position: point.toArray(), grasp: drag.grasp, hand: drag.hand });
     }
 }

@@ -4,7 +4,8 @@ import { test } from "node:test";
 import { OtherTools } from "../src/other_tools.js";
 
 /** @param {number[]} position @param {object} changes */
-const tool = (position, changes = {}) => /** @type {any} */ ({ held: true, away: false, position, ...changes });
+const tool = (position, changes = {}) =>
+    /** @type {any} */ ({ held: true, away: false, position, quaternion: [1, 0, 0, 0], ...changes });
 /** @param {OtherTools} others @param {number} now */
 const x = (others, now) => others.draw(now)[0].position[0];
 

@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 
+import { aim, handAt } from "../src/instrument_pose.js";
 import { PoseSender } from "../src/pose_sender.js";
 
 /** sends once per frame of 16 ms while the pointer jumps by 0.5 m; the positions along x and their times, ms */
@@ -52,4 +53,15 @@ test("a tool that was lifted is put down where the pointer is", (t) => {
     state.target = { position: [-0.5, 0, 0], grasp: false };
     poses.send(true);
     assert.equal(sent.at(-1).x, -0.5);
+});
+
+test("an instrument is sent with its orientation, and the shaft follows the way of the tip", (t) => {
+    const { poses, state } = followed(t, 0.2);
+    assert.equal(/** @type {any} */ (poses.last).quaternion, undefined); // a ball has none
+    const hand = handAt([0, 0, 1], [0.5, 0, 0], [0, 1, 0]);
+    state.target = { position: [-0.5, 0, 0], grasp: false, hand };
+    poses.send(true);
+    const { position, quaternion } = /** @type {any} */ (poses.last);
+    assert.ok(position[0] > -0.5 && position[0] < 0.5);
+    assert.deepEqual(quaternion, aim(hand, position));
 });

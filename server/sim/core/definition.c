@@ -7,6 +7,9 @@
 #include <stdio.h>
 #include <string.h>
 
+const char *const pal_instrument_names[PAL_INSTRUMENT_COUNT + 1] = {"ball",     "probe", "grasper",
+                                                                    "scissors", "hook",  "retractor"};
+
 void pal_scene_default(pal_scene *scene)
 {
     memset(scene, 0, sizeof *scene);

@@ -91,10 +91,26 @@ typedef struct pal_body_def {
     pal_config_entry effect[PAL_ENTRIES_MAX];
 } pal_body_def;
 
+/* what a client draws for a tool. Contact and grasp are those of the sphere of its radius, whatever its instrument */
+typedef enum pal_instrument {
+    PAL_INSTRUMENT_BALL,
+    PAL_INSTRUMENT_PROBE,
+    PAL_INSTRUMENT_GRASPER,
+    PAL_INSTRUMENT_SCISSORS,
+    PAL_INSTRUMENT_HOOK,
+    PAL_INSTRUMENT_RETRACTOR,
+    PAL_INSTRUMENT_COUNT
+} pal_instrument;
+/* "ball", "probe" ..., by pal_instrument; NULL-terminated */
+extern const char *const pal_instrument_names[PAL_INSTRUMENT_COUNT + 1];
+
 typedef struct pal_tool_def {
     char name[PAL_NAME]; /* "probe 1"                                      */
     double radius_m;     /* 0: 4 % of the first body's box diagonal         */
     double force_cap_N;  /* largest force that the tool exerts or feels; 15 */
+    pal_instrument instrument;
+    bool has_trocar;
+    double trocar_m[3]; /* the point that the shaft passes; for clients, the simulation takes any pose */
 } pal_tool_def;
 
 typedef struct pal_scene {
