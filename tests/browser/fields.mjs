@@ -29,14 +29,16 @@ const figures = (page) =>
             mix: body?.colours.uniforms.mix.value,
             components: state.running,
             wanted: state.status?.components ?? [],
-            low: document.querySelector("#legend-low").textContent,
-            high: document.querySelector("#legend-high").textContent,
+            ticks: [...document.querySelectorAll("#legend-ticks span")].map((t) => t.textContent),
+            state: document.querySelector("#legend-state").textContent,
             unit: document.querySelector("#legend-unit").textContent,
             legend: !document.querySelector("#legend").hidden,
-            options: [...document.querySelector("#field").options].map((o) => o.value),
-            note: document.querySelector("#field-note").textContent,
+            options: [...document.querySelectorAll("#field option:enabled")].map((o) => o.value),
+            note: document.querySelector("#field option:disabled")?.textContent ?? "",
         };
     });
+/** the newest values and colours are in the picture */
+const drawn = (page) => until(() => page.evaluate(() => !window.palpate.stage.dirty && window.palpate.stage.ready()));
 const choose = (page, name) =>
     page.evaluate((value) => {
         const list = document.querySelector("#field");
@@ -65,26 +67,39 @@ async function checkFields(name, scene, wanted, offered = wanted) {
         `${name}: without a choice there is no component, legend or colour`,
         !f.components.includes("field_output") && !f.legend && f.mix === 0 && f.wanted.length === 0,
     );
+    await page.keyboard.press("c");
+    f = await until(
+        () => figures(page),
+        (g) => g.values,
+    );
+    check(
+        `${name}: key C colours the first field; a body at rest keeps its natural colour, and the legend says so`,
+        f.field === offered[0] && f.legend && f.mix === 0 && /0\.25.*mm/.test(f.state),
+        f.state,
+    );
     const pixel = await until(() => organPixel(page));
     await pull(page, pixel, 9);
     for (const field of wanted) {
         await choose(page, field);
         f = await until(
             () => figures(page),
-            (g) => g.values && g.values.high > 0.3 * g.range.high && g.components.includes("field_output"),
+            (g) => g.values && g.mix === 1 && g.components.includes("field_output"),
         );
         check(
             `${name}: ${field} is displayed when chosen, with its component in the plan`,
             f.values !== null && f.components.includes("field_output") && f.legend && f.mix === 1,
-            `${f.low} to ${f.high} ${f.unit}, values ${f.values?.low.toPrecision(3)} to ${f.values?.high.toPrecision(3)}`,
+            `${f.ticks.join(" ")} ${f.unit}, values ${f.values?.low.toPrecision(3)} to ${f.values?.high.toPrecision(3)}`,
         );
         check(
-            `${name}: ${field} is within the range of the legend`,
+            `${name}: ${field} is within the range of the legend, which has five ticks in one unit`,
             f.values &&
                 f.values.high > 0 &&
-                f.values.high <= f.range.high * 1.0001 &&
-                f.values.low >= f.range.low * 0.9999,
+                f.values.high <= f.range.high + 1e-4 * Math.abs(f.range.high) &&
+                f.values.low >= f.range.low - 1e-4 * Math.abs(f.range.low) &&
+                f.ticks.length === 5 &&
+                f.unit !== "",
         );
+        await drawn(page);
         await page.screenshot({ path: join(pictures, `field_${name}_${field}.png`) });
     }
     // a long pull: the range follows
@@ -98,7 +113,7 @@ async function checkFields(name, scene, wanted, offered = wanted) {
     check(
         `${name}: the range follows a long pull`,
         f.values && f.values.high <= f.range.high * 1.0001 && f.range.high < 2.5 * f.values.high,
-        `${f.high} ${f.unit} (before ${before.high} ${before.unit})`,
+        `${f.ticks.at(-1)} ${f.unit} (before ${before.ticks.at(-1)} ${before.unit})`,
     );
     await page.screenshot({ path: join(pictures, `field_${name}_long.png`) });
     await page.mouse.up();
@@ -184,7 +199,7 @@ await run(async () => {
         await checkFields(
             "fem",
             fem,
-            ["displacement", "von_mises", "energy"],
+            ["displacement", "von_mises", "energy", "distortion"],
             ["displacement", "von_mises", "energy", "strain", "distortion"],
         );
     checkConsoles();

@@ -36,24 +36,24 @@ export class FieldColours {
         this.newer.needsUpdate = true;
         this.values = rangeOfLevels(level, low, high, visible);
         this.since = now;
-        this.enable(true);
     }
 
     /** shows tissue, until values of another field arrive */
     drop() {
         this.values = null;
-        this.enable(false);
+        this.enable(0);
     }
 
-    /** @param {boolean} on */
-    enable(on) {
-        this.uniforms.mix.value = on ? 1 : 0;
-        if (this.material) Object.assign(this.material, on ? MATT : WET);
+    /** @param {number} share of the colours: 0 natural colour, 1 the field alone */
+    enable(share) {
+        this.uniforms.mix.value = share;
+        if (this.material) Object.assign(this.material, share > 0 ? MATT : WET);
     }
 
-    /** values of the first and the last colour @param {{low: number, high: number}} range */
-    setRange(range) {
+    /** values of the first and the last colour @param {{low: number, high: number}} range @param {readonly string[]} map */
+    setRange(range, map) {
         this.uniforms.range.value.set(range.low, range.high);
+        this.uniforms.stops.value.forEach((stop, i) => stop.set(map[i]));
     }
 
     /** advances the blend @param {number} now ms @returns {boolean} the colours still change */

@@ -1,6 +1,8 @@
 // The field shown in colour: which one is chosen, what the server is asked for, the range of the colours, the legend.
 import { htmlById, makeOption, selectById } from "./dom.js";
-import { FIELDS, labels, missing, offered, rangeOf } from "./legend.js";
+import { gradientOf } from "./colour_maps.js";
+import { FIELDS, mapOf, missing, offered, rangeOf, restText, shareOf, ticksOf, titleOf } from "./legend.js";
+import { text } from "./text.js";
 
 const NOTICE_MS = 4000;
 
@@ -16,6 +18,7 @@ export class FieldDisplay {
         this.stage = stage;
         this.send = send;
         this.layout = layout;
+        this.share = 0; // of the colours, see shareOf
         this.list = selectById("field");
         this.list.onchange = () => this.choose(this.list.value);
     }
@@ -37,6 +40,7 @@ export class FieldDisplay {
         this.state.field = name;
         this.state.range = null;
         this.list.value = name;
+        this.list.classList.toggle("chosen", name !== "none");
         for (const body of this.state.bodies.values()) body.colours.drop();
         this.subscribe();
         this.showLegend();
@@ -45,7 +49,7 @@ export class FieldDisplay {
 
     /** the next in the list */
     chooseNext() {
-        const names = [...this.list.options].map((option) => option.value);
+        const names = [...this.list.options].filter((option) => !option.disabled).map((option) => option.value);
         this.choose(names[(names.indexOf(this.state.field) + 1) % names.length]);
     }
 
@@ -58,18 +62,17 @@ export class FieldDisplay {
         const note = missing(this.state.parts);
         const chosen = this.state.field;
         this.list.replaceChildren(
-            makeOption("none", "None"),
-            ...names.map((name) => makeOption(name, FIELDS[name].title)),
+            makeOption("none", text("field.none")),
+            ...names.map((name) => makeOption(name, titleOf(name))),
+            ...(note ? [Object.assign(makeOption("", note), { disabled: true })] : []),
         );
-        htmlById("field-note").textContent = note;
-        htmlById("field-note").hidden = !note;
         const stays = chosen === "none" || names.includes(chosen);
         if (reconnected || !stays) this.choose(stays ? chosen : "none");
         else {
             this.list.value = chosen;
             this.subscribe(); // parts that have the field only now
         }
-        if (!stays) this.layout.notice(`${FIELDS[chosen].title} is not available with this method.`, NOTICE_MS);
+        if (!stays) this.layout.notice(text("fields.gone", { field: titleOf(chosen) }), NOTICE_MS);
     }
 
     /** @param {Extract<import("./link.js").PageMessage, {type: "field"}>} message */
@@ -90,21 +93,34 @@ export class FieldDisplay {
         const former = this.state.range;
         const low = Math.min(...values.map((v) => v.low));
         const high = Math.max(...values.map((v) => v.high));
-        const range = rangeOf(this.state.field, low, high, former);
+        const { field } = this.state;
+        const range = rangeOf(field, low, high, former);
+        const share = shareOf(field, low, high);
         this.state.range = range;
-        for (const body of bodies) body.colours.setRange(range);
-        if (range.low !== former?.low || range.high !== former.high) this.showLegend();
+        for (const body of bodies) {
+            body.colours.setRange(range, mapOf(field));
+            body.colours.enable(body.colours.values ? share : 0);
+        }
+        const rested = this.share === 0;
+        this.share = share;
+        if (range.low !== former?.low || range.high !== former.high || rested !== (share === 0)) this.showLegend();
     }
 
     showLegend() {
         const { field, range } = this.state;
         htmlById("legend").hidden = field === "none";
         if (field === "none") return;
-        const { low, high, unit } = range ? labels(field, range) : { low: "", high: "", unit: "" };
-        htmlById("legend-title").textContent = FIELDS[field].title;
+        const { unit, ticks } = range ? ticksOf(field, range) : { unit: "", ticks: [] };
+        htmlById("legend-title").textContent = titleOf(field);
         htmlById("legend-unit").textContent = unit;
-        htmlById("legend-low").textContent = low;
-        htmlById("legend-high").textContent = high;
-        htmlById("legend-wait").hidden = range !== null;
+        htmlById("legend-colours").style.background = gradientOf(mapOf(field));
+        htmlById("legend-ticks").replaceChildren(
+            ...ticks.map((tick, k) => {
+                const mark = Object.assign(document.createElement("span"), { textContent: tick });
+                mark.style.left = `${(100 * k) / (ticks.length - 1)}%`;
+                return mark;
+            }),
+        );
+        htmlById("legend-state").textContent = !range ? text("legend.wait") : this.share === 0 ? restText(field) : "";
     }
 }

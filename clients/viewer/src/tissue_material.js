@@ -1,6 +1,6 @@
 // The material of tissue: a glossy layer over a soft, slightly translucent body. The shader mixes in the colours of a
 // field, half of them as emission, so that they match the legend on every side.
-import { COLOURS } from "./legend.js";
+import { SEQUENTIAL, STOPS } from "./colour_maps.js";
 import * as THREE from "./three.js";
 
 /** with colours highlights are faint: they would hide the values */
@@ -21,7 +21,7 @@ export function makeUniforms() {
         older: { value: new THREE.Vector2() },
         newer: { value: new THREE.Vector2() },
         blend: { value: 1 },
-        stops: { value: COLOURS.map((colour) => new THREE.Color(colour)) },
+        stops: { value: SEQUENTIAL.map((colour) => new THREE.Color(colour)) },
     };
 }
 
@@ -61,11 +61,11 @@ varying float vField;
 varying vec3 vRest;
 uniform float mapMix;
 uniform vec2 mapRange;
-uniform vec3 mapStops[${COLOURS.length}];
+uniform vec3 mapStops[${STOPS}];
 vec3 mapColour(float t) {
-  float s = clamp(t, 0.0, 1.0) * ${(COLOURS.length - 1).toFixed(1)};
+  float s = clamp(t, 0.0, 1.0) * ${(STOPS - 1).toFixed(1)};
   vec3 c = mapStops[0];
-  for (int i = 0; i < ${COLOURS.length - 1}; i++) c = mix(c, mapStops[i + 1], clamp(s - float(i), 0.0, 1.0));
+  for (int i = 0; i < ${STOPS - 1}; i++) c = mix(c, mapStops[i + 1], clamp(s - float(i), 0.0, 1.0));
   return c;
 }
 // value noise at rest positions: faint lobules that move with the tissue

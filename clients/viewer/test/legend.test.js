@@ -1,24 +1,32 @@
 // The legend: round ranges that follow the values with hysteresis, units, fields on offer.
 import assert from "node:assert/strict";
-import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { COLOURS, FIELDS, labels, missing, offered, rangeOf, roundDown, roundUp } from "../src/legend.js";
+import { DIVERGING, SEQUENTIAL } from "../src/colour_maps.js";
+import {
+    FIELDS,
+    mapOf,
+    missing,
+    offered,
+    rangeOf,
+    restText,
+    roundUp,
+    shareOf,
+    ticksOf,
+    titleOf,
+} from "../src/legend.js";
 
-test("rounds up to a number not below the value and down to one not above", () => {
-    for (const [v, up, down] of [
-        [1, 1, 1],
-        [1.01, 1.2, 1],
-        [0.0173, 0.02, 0.015],
-        [4400, 5000, 4000],
-        [9.9, 10, 8],
-        [1e-7, 1e-7, 1e-7],
-        [0.3, 0.3, 0.3],
+test("rounds up to a number not below the value", () => {
+    for (const [v, up] of [
+        [1, 1],
+        [1.01, 1.25],
+        [0.0173, 0.02],
+        [4400, 5000],
+        [9.9, 10],
+        [1e-7, 1e-7],
+        [0.3, 0.3],
     ])
-        assert.deepEqual([roundUp(v), roundDown(v)], [up, down], String(v));
-    for (let v = 1e-6; v < 1e9; v *= 1.37) {
-        assert.ok(roundUp(v) >= v * (1 - 1e-9) && roundUp(v) <= 1.5 * v, `up ${v}`);
-        assert.ok(roundDown(v) <= v * (1 + 1e-9) && roundDown(v) >= v / 1.5, `down ${v}`);
-    }
+        assert.equal(roundUp(v), up, String(v));
+    for (let v = 1e-6; v < 1e9; v *= 1.37) assert.ok(roundUp(v) >= v * (1 - 1e-9) && roundUp(v) <= 1.34 * v, `up ${v}`);
 });
 
 test("the range of a long pull contains every value", () => {
@@ -43,46 +51,77 @@ test("values that vary by half keep the range, a large drop changes it", () => {
     assert.equal(range.high, 300);
 });
 
-test("a body at rest has the smallest range", () => {
+test("a body at rest has the smallest range and its natural colour", () => {
     assert.equal(rangeOf("displacement", 0, 3e-9, null).high, FIELDS.displacement.min);
     const range = rangeOf("von_mises", 0, 1e-12, null);
-    assert.equal(range.high, 1);
+    assert.equal(range.high, 10);
     assert.deepEqual(rangeOf("von_mises", 0, 0.2, range), range);
+    assert.equal(shareOf("von_mises", 0, 4.9), 0);
+    assert.equal(shareOf("von_mises", 0, 7.5), 0.5);
+    assert.equal(shareOf("von_mises", 0, 10), 1);
+    assert.equal(shareOf("distortion", -0.01, 0), 1);
+    assert.match(restText("displacement"), /0\.25.*mm/);
+    // a material is worth showing at rest
+    for (const name of Object.keys(FIELDS)) assert.equal(shareOf(name, 0, 0) === 1, FIELDS[name].min === 0, name);
+    assert.equal(shareOf("stiffness", 1e-6, 1e-6), 1);
 });
 
-test("a range begins at 0 unless all values lie in its upper half", () => {
-    assert.deepEqual(rangeOf("von_mises", 100, 1000, null), { low: 0, high: 1000 });
-    assert.deepEqual(rangeOf("von_mises", 930, 990, null), { low: 800, high: 1000 });
-    let range = rangeOf("von_mises", 930, 990, null);
-    range = rangeOf("von_mises", 950, 990, range);
-    assert.deepEqual(range, { low: 800, high: 1000 });
-    assert.deepEqual(rangeOf("von_mises", 10, 990, range), { low: 0, high: 1000 });
-    for (let low = 0; low < 1000; low += 7) {
-        const r = rangeOf("von_mises", low, 1000, null);
-        assert.ok(r.low <= low && r.low < r.high, `${low}`);
+test("a range begins at 0 unless the values of a material are near to each other", () => {
+    assert.deepEqual(rangeOf("von_mises", 930, 990, null), { low: 0, high: 1000 });
+    assert.deepEqual(rangeOf("stiffness", 0.1, 1, null), { low: 0, high: 1 });
+    assert.deepEqual(rangeOf("stiffness", 0.99, 0.99, null), { low: 0, high: 1 });
+    const range = rangeOf("stiffness", 0.93, 0.99, null);
+    assert.deepEqual(range, { low: 0.93, high: 0.99 });
+    assert.deepEqual(rangeOf("stiffness", 0.95, 0.99, range), range);
+    assert.deepEqual(rangeOf("stiffness", 0.01, 0.99, range), { low: 0, high: 1 });
+    for (let low = 0; low < 1; low += 0.007) {
+        const r = rangeOf("stiffness", low, 1, null);
+        assert.ok(r.low <= low && r.high >= 1 && r.low < r.high, `${low}: ${r.low} ${r.high}`);
+        const step = (r.high - r.low) / 4;
+        assert.ok(Math.abs(r.low / step - Math.round(r.low / step)) < 1e-6, `${low}: ticks are multiples of a step`);
     }
 });
 
-test("the range of a signed field is symmetric", () => {
+test("the range of a signed field is symmetric, with the diverging colours", () => {
     assert.deepEqual(rangeOf("distortion", -0.013, 0.002, null), { low: -0.015, high: 0.015 });
     assert.deepEqual(rangeOf("distortion", -0.001, 0.19, null), { low: -0.2, high: 0.2 });
-    assert.deepEqual(rangeOf("distortion", 0, 0, null), { low: -1e-3, high: 1e-3 });
+    assert.deepEqual(rangeOf("distortion", 0, 0, null), { low: -5e-3, high: 5e-3 });
     let range = rangeOf("distortion", -0.009, 0.004, null);
     range = rangeOf("distortion", -0.005, 0.006, range);
     assert.deepEqual(range, { low: -0.01, high: 0.01 });
-    assert.deepEqual(labels("distortion", range), { low: "−1", high: "+1", unit: "%" });
-    assert.deepEqual(labels("strain", { low: 0, high: 0.12 }), { low: "0", high: "12", unit: "%" });
+    assert.deepEqual(ticksOf("distortion", range), { unit: "%", ticks: ["−1", "−0.5", "0", "+0.5", "+1"] });
+    for (const name of Object.keys(FIELDS))
+        assert.equal(mapOf(name), FIELDS[name].signed ? DIVERGING : SEQUENTIAL, name);
 });
 
-test("both ends have the unit of the larger one", () => {
-    assert.deepEqual(labels("displacement", { low: 0, high: 0.012 }), { low: "0", high: "12", unit: "mm" });
-    assert.deepEqual(labels("displacement", { low: 0, high: 2.5e-4 }), { low: "0", high: "250", unit: "µm" });
-    assert.deepEqual(labels("von_mises", { low: 800, high: 1200 }), { low: "0.8", high: "1.2", unit: "kPa" });
-    assert.deepEqual(labels("von_mises", { low: 0, high: 800 }), { low: "0", high: "800", unit: "Pa" });
-    assert.deepEqual(labels("energy", { low: 0, high: 0.25 }), { low: "0", high: "250", unit: "mJ/m³" });
-    assert.deepEqual(labels("energy", { low: 0, high: 3e6 }), { low: "0", high: "3", unit: "MJ/m³" });
-    assert.deepEqual(labels("stiffness", { low: 0, high: 2.5e-3 }), { low: "0", high: "2.5", unit: "mJ" });
-    assert.deepEqual(labels("stiffness", rangeOf("stiffness", 4e-6, 9e-6, null)), { low: "0", high: "10", unit: "µJ" });
+test("five short ticks have the unit of the largest", () => {
+    assert.deepEqual(ticksOf("displacement", { low: 0, high: 0.012 }), {
+        unit: "mm",
+        ticks: ["0", "3", "6", "9", "12"],
+    });
+    assert.deepEqual(ticksOf("displacement", { low: 0, high: 5e-4 }).ticks, ["0", "0.125", "0.25", "0.375", "0.5"]);
+    assert.deepEqual(ticksOf("von_mises", { low: 0, high: 1200 }), {
+        unit: "kPa",
+        ticks: ["0", "0.3", "0.6", "0.9", "1.2"],
+    });
+    assert.equal(ticksOf("von_mises", { low: 0, high: 800 }).unit, "Pa");
+    assert.equal(ticksOf("energy", { low: 0, high: 3e6 }).unit, "MJ/m³");
+    assert.deepEqual(ticksOf("strain", { low: 0, high: 0.12 }).ticks.at(-1), "12");
+    // ticks of any range are exact multiples, which four digits can write
+    for (const name of Object.keys(FIELDS))
+        for (let v = 1e-5; v < 1e7; v *= 1.07) {
+            const range = rangeOf(name, 0, v, null);
+            const { unit, ticks } = ticksOf(name, range);
+            const size = FIELDS[name].units.find(([u]) => u === unit)[1];
+            ticks.forEach((tick, k) => {
+                const wanted = range.low + ((range.high - range.low) * k) / 4;
+                assert.ok(Math.abs(Number(tick.replace("−", "-")) * size - wanted) < 1e-9 * range.high, `${name} ${v}`);
+            });
+        }
+});
+
+test("each field has a name", () => {
+    for (const name of Object.keys(FIELDS)) assert.ok(titleOf(name) && !titleOf(name).includes("."), name);
 });
 
 test("only fields of the session are offered, with the reason why others are missing", () => {
@@ -98,14 +137,4 @@ test("only fields of the session are offered, with the reason why others are mis
     assert.match(missing([plain]), /finite elements/);
     assert.match(missing([springs, fem]), /Some bodies/);
     assert.match(missing([{}]), /no fields/);
-});
-
-test("colours grow lighter from stop to stop, and the legend of style.css has the same", () => {
-    const light = COLOURS.map((c) => {
-        const [r, g, b] = [1, 3, 5].map((i) => (parseInt(c.slice(i, i + 2), 16) / 255) ** 2.2);
-        return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-    });
-    for (let i = 1; i < light.length; i++) assert.ok(light[i] > light[i - 1] * 1.1, `stop ${i}`);
-    const style = readFileSync(new URL("../style.css", import.meta.url), "utf8");
-    assert.ok(style.includes(COLOURS.join(", ")));
 });
