@@ -22,10 +22,11 @@ typedef enum pal_wire_field {
     PAL_WIRE_FIELD_STIFFNESS_J,
     PAL_WIRE_FIELD_STRAIN,
     PAL_WIRE_FIELD_DISTORTION,
+    PAL_WIRE_FIELD_YOUNG_PA,
     PAL_WIRE_FIELD_COUNT
 } pal_wire_field;
 /* field of a name, as in `subscribe_field` and in parts: "none", "displacement", "von_mises", "energy", "stiffness",
- * "strain", "distortion"; COUNT: unknown */
+ * "strain", "distortion", "young"; COUNT: unknown */
 pal_wire_field pal_wire_field_find(const char *name);
 
 typedef struct pal_field_head {

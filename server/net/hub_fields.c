@@ -13,6 +13,7 @@ _Static_assert((int)PAL_WIRE_FIELD_DISPLACEMENT_M == (int)PAL_FIELD_DISPLACEMENT
                    (int)PAL_WIRE_FIELD_STIFFNESS_J == (int)PAL_FIELD_STIFFNESS_J &&
                    (int)PAL_WIRE_FIELD_STRAIN == (int)PAL_FIELD_STRAIN &&
                    (int)PAL_WIRE_FIELD_DISTORTION == (int)PAL_FIELD_DISTORTION &&
+                   (int)PAL_WIRE_FIELD_YOUNG_PA == (int)PAL_FIELD_YOUNG_PA &&
                    (int)PAL_WIRE_FIELD_COUNT == (int)PAL_FIELD_COUNT,
                "fields are numbered alike");
 
@@ -25,7 +26,7 @@ bool pal_hub_subscribe_field(pal_client *c, const pal_wire_field_subscription *v
     int part = (int)view->part;
     if (field == PAL_WIRE_FIELD_COUNT) return pal_hub_refuse(c, "field", "there is no field %s", view->field);
     if (field != PAL_WIRE_FIELD_NONE && !pal_session_has_field(c->room->session, part, (pal_field)field))
-        return pal_hub_refuse(c, "field", "%s gives no %s: its model has no finite elements", s->part[part].info.name,
+        return pal_hub_refuse(c, "field", "%s gives no %s with this method", s->part[part].info.name,
                               pal_field_title((pal_field)field));
     pal_hub_set_field(c, part, (pal_field)field);
     pal_hub_update_subscriptions(c->room);

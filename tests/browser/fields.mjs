@@ -193,14 +193,20 @@ function prepareFem() {
 
 await run(async () => {
     const only = process.argv[4];
-    if (only !== "fem") await checkFields("springs", prepare(), ["displacement", "stiffness"]);
+    if (only !== "fem")
+        await checkFields(
+            "springs",
+            prepare(),
+            ["displacement", "stiffness"],
+            ["displacement", "stiffness", "strain", "distortion"],
+        );
     const fem = only === "springs" ? null : prepareFem();
     if (fem)
         await checkFields(
             "fem",
             fem,
             ["displacement", "von_mises", "energy", "distortion"],
-            ["displacement", "von_mises", "energy", "strain", "distortion"],
+            ["displacement", "von_mises", "energy", "young", "strain", "distortion"],
         );
     checkConsoles();
 });

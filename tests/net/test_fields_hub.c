@@ -44,9 +44,9 @@ static void a_field_goes_only_to_those_who_ask_and_ends_with_them(void)
     mem_join(&bob, transport, "Bob", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     UNTIL(ada.n_tools > 2 && bob.n_tools > 2, &ada, &bob);
     const pal_wire_hello *hello = &ada.last[PAL_CONTROL_HELLO].hello;
-    CHECK_INT(hello->part[0].n_field, 2);
-    CHECK_TEXT(hello->part[0].field[0], "displacement");
-    CHECK_TEXT(hello->part[0].field[1], "stiffness");
+    static const char *const offered[] = {"displacement", "stiffness", "strain", "distortion"};
+    CHECK_INT(hello->part[0].n_field, 4);
+    for (int i = 0; i < 4; i++) CHECK_TEXT(hello->part[0].field[i], offered[i]);
     uint32_t n_row = hello->plan.n_component;
     mem_text(&ada, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}");
     UNTIL(ada.n_field > 0, &ada, &bob);

@@ -12,6 +12,7 @@ export const FIELD_NAMES = Object.freeze([
     "stiffness",
     "strain",
     "distortion",
+    "young",
 ]);
 
 const need = checkOf("field");

@@ -43,6 +43,7 @@ export const FIELDS = Object.freeze({
             ["J", 1],
         ],
     },
+    young: { min: 0, units: PRESSURES },
     strain: { min: 5e-3, units: PERCENT },
     distortion: { min: 5e-3, units: PERCENT, signed: true },
 });

@@ -333,6 +333,7 @@ export const GERMAN = {
     "field.von_mises": "Spannung (von Mises)",
     "field.energy": "Verzerrungsenergiedichte",
     "field.stiffness": "Federsteifigkeit",
+    "field.young": "Steifigkeit des Gewebes",
     "field.strain": "Größte Dehnung",
     "field.distortion": "Volumenänderung",
     "fields.none": "Diese Sitzung hat keine Farbfelder.",

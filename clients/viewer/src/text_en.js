@@ -332,6 +332,7 @@ export const ENGLISH = {
     "field.von_mises": "Stress (von Mises)",
     "field.energy": "Strain energy density",
     "field.stiffness": "Spring stiffness",
+    "field.young": "Stiffness of the tissue",
     "field.strain": "Largest strain",
     "field.distortion": "Volume change",
     "fields.none": "This session has no fields.",

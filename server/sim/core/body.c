@@ -8,8 +8,8 @@
 #include <math.h>
 #include <string.h>
 
-static const char *const field_name[PAL_FIELD_COUNT] = {"none",      "displacement", "von_mises", "energy",
-                                                        "stiffness", "strain",       "distortion"};
+static const char *const field_name[PAL_FIELD_COUNT] = {"none",      "displacement", "von_mises",  "energy",
+                                                        "stiffness", "strain",       "distortion", "young"};
 
 const char *pal_field_name(pal_field field)
 {
@@ -26,8 +26,8 @@ pal_field pal_field_find(const char *name)
 const char *pal_field_title(pal_field field)
 {
     static const char *const title[PAL_FIELD_COUNT] = {
-        "no field",       "displacement",   "von Mises stress", "strain energy density",
-        "edge stiffness", "largest strain", "volume distortion"};
+        "no field",       "displacement",   "von Mises stress",  "strain energy density",
+        "edge stiffness", "largest strain", "volume distortion", "Young's modulus"};
     return title[(unsigned)field < PAL_FIELD_COUNT ? field : PAL_FIELD_NONE];
 }
 

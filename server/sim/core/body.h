@@ -41,9 +41,10 @@ typedef enum pal_field {
     PAL_FIELD_STIFFNESS_J, /* mean constant k_d of the edges at a node, paper B fig. 13 f */
     PAL_FIELD_STRAIN,      /* largest principal stretch - 1, paper A fig. 13              */
     PAL_FIELD_DISTORTION,  /* volume over volume at rest - 1                              */
+    PAL_FIELD_YOUNG_PA,    /* Young's modulus of the material there, paper A figs. 8b, 9b */
     PAL_FIELD_COUNT
 } pal_field;
-/* "displacement", "von_mises", "energy", "stiffness", "strain", "distortion", "none"; never NULL [any] */
+/* "displacement", "von_mises", "energy", "stiffness", "strain", "distortion", "young", "none"; never NULL [any] */
 const char *pal_field_name(pal_field field);
 pal_field pal_field_find(const char *name);   /* NONE: there is no field of that name [any] */
 const char *pal_field_title(pal_field field); /* for sentences: "von Mises stress" [any]    */

@@ -127,12 +127,18 @@ static double distortion(const pal_cell_points *points, int p)
     return points->det_f[p] - 1;
 }
 
+static double young(const pal_cell_points *points, int p)
+{
+    return points->young_Pa[p];
+}
+
 static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
 {
     static pal_cell_value *const value[PAL_FIELD_COUNT] = {[PAL_FIELD_VON_MISES_PA] = von_mises,
                                                            [PAL_FIELD_ENERGY_J_M3] = density,
                                                            [PAL_FIELD_STRAIN] = strain,
-                                                           [PAL_FIELD_DISTORTION] = distortion};
+                                                           [PAL_FIELD_DISTORTION] = distortion,
+                                                           [PAL_FIELD_YOUNG_PA] = young};
     if (value[field]) pal_cells_elastic_measure(self, body->d, value[field], sum, volume_m3);
 }
 

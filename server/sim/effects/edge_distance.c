@@ -3,7 +3,10 @@
  *
  * Departures: erratum B1 (the paper's force lacks 1/l0^2). An edge shorter than 1e-9 of its rest length takes its
  * rest direction, so that a body collapsed to a plane or a point opens again. */
+#include "server/base/vec3.h"
+#include "server/num/polar.h"
 #include "server/sim/effects/spring_effect.h"
+#include "server/sim/elements/elastic_law.h"
 
 #include <stdlib.h>
 
@@ -128,10 +131,32 @@ static void measure_regions(const pal_spring_set *set, double *sum, double *volu
     }
 }
 
+/* strain or distortion of the tetrahedra, which the springs make no use of */
+static void measure_tets(const pal_body *body, pal_field field, double *sum, double *volume_m3)
+{
+    for (int t = 0; t < body->tets->n_tet; t++) {
+        const int32_t *node = body->tets->tet + 4 * (size_t)t;
+        double rest[9], now[9], cofactor[9], f[9];
+        for (int i = 0; i < 9; i++) {
+            size_t a = 3 * (size_t)node[i % 3 + 1] + (size_t)(i / 3), b = 3 * (size_t)node[0] + (size_t)(i / 3);
+            rest[i] = body->x_rest[a] - body->x_rest[b];
+            now[i] = body->d[a] - body->d[b];
+        }
+        /* F = now rest^-1 */
+        double det = pal_det3(rest), volume = fabs(det) / 6;
+        if (!(volume > 0)) continue;
+        pal_cofactor3(rest, cofactor);
+        for (int i = 0; i < 9; i++) f[i] = pal_dot3(now + 3 * (i / 3), cofactor + 3 * (i % 3)) / det;
+        double value = field == PAL_FIELD_STRAIN ? pal_largest_strain(f) : pal_det3(f) - 1;
+        for (int k = 0; k < 4; k++) sum[node[k]] += volume * value, volume_m3[node[k]] += volume;
+    }
+}
+
 /* the constant before the springs' weights, which differ between edges of a lattice */
 static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
 {
     const edge_distance *e = self;
+    if (field == PAL_FIELD_STRAIN || field == PAL_FIELD_DISTORTION) measure_tets(body, field, sum, volume_m3);
     if (field != PAL_FIELD_STIFFNESS_J) return;
     if (e->set.whole) {
         measure_regions(&e->set, sum, volume_m3);
@@ -143,10 +168,12 @@ static void measure(void *self, const pal_body *body, pal_field field, double *s
     }
 }
 
-const pal_effect pal_effect_edge_distance = {PAL_EFFECT("edge_distance", FORCE),
-                                             .destroy = spring_destroy,
-                                             .internal = true,
-                                             .energy = energy,
-                                             .bounds = {.stiffness = stiffness, .damping = damping},
-                                             .material = pal_spring_set_material,
-                                             .inspect = {.measure = measure, .fields = 1u << PAL_FIELD_STIFFNESS_J}};
+const pal_effect pal_effect_edge_distance = {
+    PAL_EFFECT("edge_distance", FORCE),
+    .destroy = spring_destroy,
+    .internal = true,
+    .energy = energy,
+    .bounds = {.stiffness = stiffness, .damping = damping},
+    .material = pal_spring_set_material,
+    .inspect = {.measure = measure,
+                .fields = 1u << PAL_FIELD_STIFFNESS_J | 1u << PAL_FIELD_STRAIN | 1u << PAL_FIELD_DISTORTION}};

@@ -14,6 +14,7 @@
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/surface/active_nodes.h"
+#include "server/sim/surface/adaptive_measure.h"
 #include "server/sim/surface/adaptive_surface.h"
 
 /* springs per batch, so that the processor has several blocks in flight */
@@ -280,9 +281,20 @@ static pal_err material(void *self, const pal_body *body, const pal_material *to
     return PAL_ERR_OK;
 }
 
+static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *area_m2)
+{
+    const edge_spring *e = self;
+    const pal_adaptive_springs springs = {.k_N_m = e->k_N_m * e->adaptive->spring_ramp,
+                                          .thickness_m = e->thickness_m,
+                                          .young_Pa = e->young_Pa,
+                                          .edge_young = e->young};
+    pal_adaptive_measure(e->adaptive, &springs, body->d, field, sum, area_m2);
+}
+
 const pal_effect pal_effect_edge_spring = {PAL_EFFECT("edge_spring", FORCE),
                                            .internal = true,
                                            .compute_forces = compute_forces,
                                            .energy = energy,
                                            .bounds = {.stiffness = stiffness, .damping = damping},
-                                           .material = material};
+                                           .material = material,
+                                           .inspect = {.measure = measure, .fields = PAL_ADAPTIVE_FIELDS}};

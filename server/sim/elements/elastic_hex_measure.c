@@ -1,5 +1,5 @@
-/* What is shown of voxel hexahedra: von Mises stress, energy density, strain and distortion at the Gauss point nearest
- * to each corner, which represents an eighth of the cube; and the stress there, for error estimates. */
+/* What is shown of voxel hexahedra: von Mises stress, energy density, strain, distortion and modulus at the Gauss point
+ * nearest to each corner, which represents an eighth of the cube; and the stress there, for error estimates. */
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
 #include "server/num/shape_functions.h"
@@ -101,6 +101,7 @@ void pal_hex_measure(pal_elastic_hexes *cubes, const pal_body *body, pal_field f
         for (int c = 0; c < 8; c++) {
             sum[node[c]] += volume * (field == PAL_FIELD_VON_MISES_PA  ? von_mises(cubes, &at, c)
                                       : field == PAL_FIELD_ENERGY_J_M3 ? at.density[c]
+                                      : field == PAL_FIELD_YOUNG_PA    ? pal_lame_young_Pa(at.mu, at.lambda)
                                       : field == PAL_FIELD_STRAIN      ? pal_largest_strain(at.f[c])
                                                                        : pal_det3(at.f[c]) - 1);
             volume_m3[node[c]] += volume;

@@ -12,8 +12,8 @@
 
 /* fields that elements measure */
 enum {
-    PAL_ELASTIC_FIELDS =
-        1 << PAL_FIELD_VON_MISES_PA | 1 << PAL_FIELD_ENERGY_J_M3 | 1 << PAL_FIELD_STRAIN | 1 << PAL_FIELD_DISTORTION
+    PAL_ELASTIC_FIELDS = 1 << PAL_FIELD_VON_MISES_PA | 1 << PAL_FIELD_ENERGY_J_M3 | 1 << PAL_FIELD_STRAIN |
+                         1 << PAL_FIELD_DISTORTION | 1 << PAL_FIELD_YOUNG_PA
 };
 
 /* what a pass over elements computes: forces are added, the energy is returned */
@@ -23,6 +23,10 @@ typedef enum pal_elastic_law { PAL_LAW_COROTATIONAL, PAL_LAW_LINEAR, PAL_LAW_NEO
 /* key "law": corotational (default), linear or neo_hookean; REFUSED names another. [load] */
 pal_err pal_elastic_law_read(pal_config_entry *item, pal_elastic_law *out, pal_diagnostic *diag);
 void pal_lame(double young_Pa, double poisson, double *mu_Pa, double *lambda_Pa);
+static inline double pal_lame_young_Pa(double mu_Pa, double lambda_Pa)
+{
+    return mu_Pa * (3 * lambda_Pa + 2 * mu_Pa) / (lambda_Pa + mu_Pa);
+}
 
 /* r = a b (transposed: a' b); r = a b'; r apart from a and b */
 void pal_elastic_mul(double r[9], const double a[9], bool transposed, const double b[9]);

@@ -300,13 +300,14 @@ void pal_elastic_tets_rotate(const pal_elastic_tets *t, double *rotation)
 }
 
 /* von Mises of the Cauchy stress P F'/J (neo-Hookean) or of the small-strain stress in current axes, which has the same
- * von Mises as that in the element's; energy density; strain and distortion. At one Gauss point */
+ * von Mises as that in the element's; energy density; strain and distortion; modulus. At one Gauss point */
 static double field_at(const pal_elastic_tets *t, int e, int point, const double *d, pal_field field)
 {
     double volume = *pal_lane(t->volume_m3, 1, t->place[e], 0);
     double mu, lambda;
     pal_tet_whole_stiffness(t, e, &mu, &lambda);
     mu /= volume, lambda /= volume;
+    if (field == PAL_FIELD_YOUNG_PA) return pal_lame_young_Pa(mu, lambda);
     double f[9], r[9], p[9], s[9];
     pal_elastic_tets_gradient(t, e, point, d, f);
     if (field == PAL_FIELD_STRAIN) return pal_largest_strain(f);

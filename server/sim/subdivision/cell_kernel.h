@@ -121,7 +121,8 @@ typedef struct pal_cell_points {
     double von_mises_Pa[PAL_CELL_GAUSS_POINTS], energy_J_m3[PAL_CELL_GAUSS_POINTS];
     double det_f[PAL_CELL_GAUSS_POINTS];   /* volume now over volume at rest      */
     double stretch[PAL_CELL_GAUSS_POINTS]; /* largest principal stretch less 1 */
-    double rotation[9];                    /* Q                                   */
+    double young_Pa[PAL_CELL_GAUSS_POINTS];
+    double rotation[9]; /* Q                                   */
 } pal_cell_points;
 /* the same for both operators */
 void pal_cells_elastic_points(const pal_cells_elastic *c, const double *d, pal_cell_kind kind, int element,

@@ -16,9 +16,7 @@ bool pal_field_components_given(const pal_plan *plan, int body, pal_field field)
 static pal_err refuse(const pal_plan *plan, int body, pal_field field, pal_diagnostic *diag)
 {
     if (body < 0 || body >= plan->n_body) return PAL_REFUSE(diag, "body %d does not exist", body);
-    return PAL_REFUSE(diag, "body \"%s\" gives no %s: its model has no %s", plan->body[body].name,
-                      pal_field_title(field),
-                      field == PAL_FIELD_STIFFNESS_J ? "edges that are springs" : "finite elements");
+    return PAL_REFUSE(diag, "body \"%s\" gives no %s with its model", plan->body[body].name, pal_field_title(field));
 }
 
 pal_err pal_field_components_check(const pal_plan *plan, pal_diagnostic *diag)

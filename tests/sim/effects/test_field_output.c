@@ -83,8 +83,8 @@ static void nobody_looks_nothing_is_there_and_looking_changes_no_bit(void)
             for (int k = 1; k < PAL_FIELD_COUNT; k++)
                 CHECK_INT(pal_world_field(b.world, 0, (pal_field)k, true, &diag),
                           pal_world_has_field(b.world, 0, (pal_field)k) ? 0 : PAL_ERR_REFUSED);
-            CHECK_INT(pal_world_component_count(b.world), rows + 4);
-            CHECK_INT(rows_named(b.world, "field_output"), 4);
+            CHECK_INT(pal_world_component_count(b.world), rows + 6);
+            CHECK_INT(rows_named(b.world, "field_output"), 6);
             CHECK(pal_world_bytes(b.world) > n_byte);
             CHECK(b.body->display.field[PAL_FIELD_VON_MISES_PA] &&
                   b.body->display.field[PAL_FIELD_VON_MISES_PA]->revision > 0);
@@ -93,9 +93,13 @@ static void nobody_looks_nothing_is_there_and_looking_changes_no_bit(void)
         if (i == 20) CHECK_INT(pal_world_field(b.world, 0, PAL_FIELD_VON_MISES_PA, false, &diag), 0);
         if (i == 25) CHECK_INT(pal_world_field(b.world, 0, PAL_FIELD_DISPLACEMENT_M, false, &diag), 0);
         if (i == 25) CHECK_INT(pal_world_field(b.world, 0, PAL_FIELD_DISPLACEMENT_M, false, &diag), 0);
-        if (i == 25) CHECK_INT(pal_world_component_count(b.world), rows + 2);
+        if (i == 25) CHECK_INT(pal_world_component_count(b.world), rows + 4);
         if (i == 30) CHECK_INT(pal_world_field(b.world, 0, PAL_FIELD_STIFFNESS_J, false, &diag), 0);
-        if (i == 40) CHECK_INT(pal_world_field(b.world, 0, PAL_FIELD_ENERGY_J_M3, false, &diag), 0);
+        if (i == 40) {
+            CHECK_INT(pal_world_field(b.world, 0, PAL_FIELD_ENERGY_J_M3, false, &diag), 0);
+            CHECK_INT(pal_world_field(b.world, 0, PAL_FIELD_DISTORTION, false, &diag), 0);
+            CHECK_INT(pal_world_field(b.world, 0, PAL_FIELD_STRAIN, false, &diag), 0);
+        }
         press(&a, i), press(&b, i);
         CHECK(step_world(&a, 1) && step_world(&b, 1));
         CHECK(pal_world_hash(a.world) == pal_world_hash(b.world));
@@ -442,10 +446,30 @@ static void strain_and_distortion_of_a_stretched_block_are_exact(void)
         double across = 1 - s.scene->body[0].material.poisson * strain;
         REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_STRAIN, true, NULL));
         REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_DISTORTION, true, NULL));
+        REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_YOUNG_PA, true, NULL));
+        CHECK_LE(worst_error(s.body, PAL_FIELD_YOUNG_PA, s.scene->body[0].material.young_Pa), 1e-6);
         CHECK_LE(worst_error(s.body, PAL_FIELD_STRAIN, strain), 2e-6);
         CHECK_LE(worst_error(s.body, PAL_FIELD_DISTORTION, (1 + strain) * across * across - 1), 2e-5);
         close_fem(&s);
     }
+}
+
+/* the tetrahedra of a block of springs moved by F, turned */
+static void strain_and_distortion_of_springs_are_those_of_their_tetrahedra(void)
+{
+    const double stretch[3] = {1.05, 0.97, 1.01}, c = cos(0.9), n = sin(0.9), turn[9] = {c, -n, 0, n, c, 0, 0, 0, 1};
+    tool_scene s;
+    REQUIRE(slab_scene(&s, 4, 3, 2, 0.01, 1, 0.01, 15) && tool_scene_open(&s));
+    for (int i = 0; i < s.body->n_dof; i++) {
+        double at[3];
+        for (int a = 0; a < 3; a++) at[a] = s.body->x_rest[3 * i + a] * stretch[a];
+        pal_mul33(s.body->x + 3 * (size_t)i, turn, at);
+    }
+    REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_STRAIN, true, NULL));
+    REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_DISTORTION, true, NULL));
+    CHECK_LE(worst_error(s.body, PAL_FIELD_STRAIN, 0.05), 1e-6);
+    CHECK_LE(worst_error(s.body, PAL_FIELD_DISTORTION, stretch[0] * stretch[1] * stretch[2] - 1), 1e-6);
+    tool_scene_close(&s);
 }
 
 /* a block of control cells whose points are moved by F, which its nodes follow to the digit: one stretch out and one
@@ -475,6 +499,8 @@ static void strain_and_distortion_of_a_solid_are_exact(void)
         CHECK(!pal_world_has_field(s.world, 0, PAL_FIELD_STIFFNESS_J));
         REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_STRAIN, true, NULL));
         REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_DISTORTION, true, NULL));
+        REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_YOUNG_PA, true, NULL));
+        CHECK_LE(worst_error(s.body, PAL_FIELD_YOUNG_PA, s.scene->body[0].material.young_Pa), 1e-6);
         CHECK_LE(worst_error(s.body, PAL_FIELD_STRAIN, wanted[k]), 1e-6);
         CHECK_LE(worst_error(s.body, PAL_FIELD_DISTORTION, stretch[k][0] * stretch[k][1] * stretch[k][2] - 1), 1e-6);
         tool_scene_close(&s);
@@ -538,6 +564,7 @@ int main(void)
     RUN(rows_of_other_bodies_stay_theirs);
     RUN(stress_and_energy_of_a_stretched_block_are_those_of_uniaxial_tension);
     RUN(strain_and_distortion_of_a_stretched_block_are_exact);
+    RUN(strain_and_distortion_of_springs_are_those_of_their_tetrahedra);
     RUN(strain_and_distortion_of_a_solid_are_exact);
     RUN(the_largest_strain_is_that_of_the_largest_stretch);
     RUN(looking_at_a_live_body_of_elements_changes_no_bit);

@@ -175,6 +175,42 @@ static void springs_without_length_push_open(void)
     shell_plan_close(&p);
 }
 
+/* sum over the body's area of what is shown */
+static double field_sum(const shell_plan *p, pal_field field, double *area_m2)
+{
+    shell_plan *plan = (shell_plan *)(uintptr_t)p;
+    const pal_component *row = shell_plan_row(plan, "edge_spring");
+    double *sum = calloc(2 * (size_t)p->body->n_node, sizeof *sum), total = 0;
+    *area_m2 = 0;
+    if (!sum) abort();
+    row->effect->inspect.measure(row->self, p->body, field, sum, sum + p->body->n_node);
+    for (int i = 0; i < p->body->n_node; i++) total += sum[i], *area_m2 += sum[p->body->n_node + i];
+    free(sum);
+    return total;
+}
+
+static double field_mean(const shell_plan *p, pal_field field)
+{
+    double area_m2, sum = field_sum(p, field, &area_m2);
+    return sum / area_m2;
+}
+
+/* whatever the mixture and the law: shares of the leaves in their springs add up */
+static void energy_of_the_leaves_is_that_of_the_springs(void)
+{
+    for (int shape = 0; shape < 3; shape++)
+        for (int law = 0; law < 2; law++) {
+            shell_plan p;
+            REQUIRE(open_mixture(&p, shape, laws[law], 0));
+            shell_plan_shake(&p, 0.1, 0);
+            p.adaptive->spring_ramp = 0.7;
+            const pal_component *row = shell_plan_row(&p, "edge_spring");
+            double area_m2, density = field_sum(&p, PAL_FIELD_ENERGY_J_M3, &area_m2);
+            CHECK_NEAR(0.003 * density / row->effect->energy(row->self, p.body), 1, 1e-6);
+            shell_plan_close(&p);
+        }
+}
+
 /* a flat lattice of equilateral triangles, thickness t: springs have the energy of a sheet with Young's modulus E t per
  * length and Poisson ratio 1/3 in every direction. The strain of 1e-5 shows in the digits; on finer levels the
  * butterfly rounds those corners of the rim that turn by 60 degrees, which is 0.6 % of the energy */
@@ -213,6 +249,10 @@ static void sheet_of_equilateral_triangles_stretches_as_its_material(void)
             }
             double J = row->effect->energy(row->self, p.body);
             CHECK_NEAR(J / (0.5 * E2D * strain * strain * area), 1, level == 0 ? 1e-4 : 0.007);
+            /* uniaxial tension: the stress is E e at every node but those of rounded corners */
+            CHECK_NEAR(field_mean(&p, PAL_FIELD_VON_MISES_PA) / (5000 * strain), 1, level == 0 ? 1e-4 : 0.007);
+            CHECK_NEAR(field_mean(&p, PAL_FIELD_STRAIN) / strain, 1, 1e-4);
+            CHECK_NEAR(field_mean(&p, PAL_FIELD_YOUNG_PA), 5000, 1e-6);
         }
         shell_plan_close(&p);
     }
@@ -416,6 +456,7 @@ int main(void)
     RUN(damping_takes_energy_and_leaves_momentum);
     RUN(springs_without_length_push_open);
     RUN(sheet_of_equilateral_triangles_stretches_as_its_material);
+    RUN(energy_of_the_leaves_is_that_of_the_springs);
     RUN(fabric_of_square_cells_bears_seven_eighths_along_its_threads);
     RUN(paper_law_softens_by_level);
     RUN(stiffness_bounds_the_rows_of_the_hessian);
