@@ -76,6 +76,7 @@ typedef struct pal_wire_part_info {
     double error_m;                  /* bound per axis of its frames in normal use */
     uint32_t n_field;                /* fields for `subscribe_field`; 0 also from servers without fields */
     char field[PAL_WIRE_FIELDS_MAX][PAL_WIRE_FIELD_BYTES]; /* "displacement", "von_mises" ...           */
+    char interior[PAL_WIRE_NAME_BYTES]; /* path of the asset of its interior, as `asset`; "": it has none */
     bool is_sculptable; /* its control cells and material can be changed by commands; false is not on the wire */
     bool is_adaptive;   /* its triangles change; clients that accept TOPOLOGY_DELTA get the changes, and n_triangle
                            counts slots */
@@ -320,6 +321,7 @@ typedef struct pal_wire_estimate {
 typedef struct pal_wire_field_subscription {
     uint32_t part;
     char field[PAL_WIRE_FIELD_BYTES]; /* as in the part's list, or "none" */
+    bool interior;                    /* INTERIOR messages too; where the part has none, there are none */
 } pal_wire_field_subscription;
 
 typedef struct pal_control {

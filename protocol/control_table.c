@@ -16,6 +16,7 @@ static const pal_control_field part_fields[] = {{"name", TEXT, true, ONE(part_in
                                                 {"asset", TEXT, true, ONE(part_info, asset)},
                                                 {"error_m", F64, true, ONE(part_info, error_m)},
                                                 {"fields", TEXTS, false, LIST(part_info, field, n_field), NULL},
+                                                {"interior", TEXT_OR_EMPTY, false, ONE(part_info, interior)},
                                                 {"adaptive", BOOL, false, ONE(part_info, is_adaptive)},
                                                 {"sculptable", BOOL, false, ONE(part_info, is_sculptable)},
                                                 {0}};
@@ -143,8 +144,10 @@ static const pal_control_field COMMAND_fields[] = {{"verb", TEXT, true, ONE(comm
                                                    {0}};
 static const pal_control_field TAKE_TOOL_fields[] = {{"tool", TOOL, true, 0, 0, 0, 0, NULL}, {0}};
 static const pal_control_field RELEASE_TOOL_fields[] = {{0}};
-static const pal_control_field SUBSCRIBE_FIELD_fields[] = {
-    {"part", U32, true, ONE(field_subscription, part)}, {"field", TEXT, true, ONE(field_subscription, field)}, {0}};
+static const pal_control_field SUBSCRIBE_FIELD_fields[] = {{"part", U32, true, ONE(field_subscription, part)},
+                                                           {"field", TEXT, true, ONE(field_subscription, field)},
+                                                           {"interior", BOOL, false, ONE(field_subscription, interior)},
+                                                           {0}};
 static const pal_control_field ANSWER_fields[] = {{"verb", TEXT, true, ONE(answer, verb)},
                                                   {"text", TEXT, true, ONE(answer, text)},
                                                   {"args", ARGS, false, LIST(answer, arg, n_arg), NULL},

@@ -111,7 +111,8 @@ static bool take_fields(const uint8_t **at, const field *f, void *to)
 static bool known_kind(uint8_t kind)
 {
     return kind == PAL_WIRE_FRAME || kind == PAL_WIRE_TOOLS || kind == PAL_WIRE_HAPTIC || kind == PAL_WIRE_FIELD ||
-           kind == PAL_WIRE_TOPOLOGY_DELTA || kind == PAL_WIRE_POSE || kind == PAL_WIRE_ACK;
+           kind == PAL_WIRE_TOPOLOGY_DELTA || kind == PAL_WIRE_INTERIOR || kind == PAL_WIRE_POSE ||
+           kind == PAL_WIRE_ACK;
 }
 
 int pal_wire_get_head(const uint8_t *bytes, size_t n_byte, pal_wire_head *out)

@@ -33,6 +33,7 @@ typedef enum pal_wire_kind {
     PAL_WIRE_HAPTIC = 3,         /* server to client: contact model for one tool's holder       */
     PAL_WIRE_FIELD = 4,          /* server to client that asked: numbers for colours, field_codec.h */
     PAL_WIRE_TOPOLOGY_DELTA = 5, /* server to client that takes them: changed triangles, topology_delta_codec.h */
+    PAL_WIRE_INTERIOR = 6,       /* server to client that asked: displacements and values inside, interior_codec.h */
     PAL_WIRE_POSE = 16,          /* client to server: pose of the tool it holds                 */
     PAL_WIRE_ACK = 17            /* client to server: cycle taken in, gives credit              */
 } pal_wire_kind;

@@ -276,7 +276,10 @@ static void get_metrics(pal_hub *hub, const pal_request *request, pal_reply *rep
 static pal_packet *find_asset(const pal_hub_room *room, const char *path)
 {
     for (int p = 0; p < room->stream->n_part; p++)
-        if (!strcmp(room->stream->part[p].info.asset, path)) return room->stream->part[p].asset;
+        if (!strcmp(room->stream->part[p].info.asset, path))
+            return room->stream->part[p].asset;
+        else if (!strcmp(room->stream->part[p].info.interior, path))
+            return room->stream->part[p].interior_asset;
     for (int i = 0; i < PAL_HUB_OLD_ASSETS; i++)
         if (room->past[i].asset && !strcmp(room->past[i].path, path)) return room->past[i].asset;
     return NULL;

@@ -75,8 +75,9 @@ typedef struct pal_client {
     bool topology_deltas;               /* accepts TOPOLOGY_DELTA */
     uint32_t sent_change[PAL_BODY_MAX]; /* last triangle change sent, per part (pal_triangle_slots.change) */
     uint8_t view[PAL_BODY_MAX];         /* subscribed pal_field, per part */
-    uint64_t sent_field[PAL_BODY_MAX];  /* number of the last values sent */
-    bool estimate[PAL_BODY_MAX], estimate_due[PAL_BODY_MAX]; /* subscribed; due */
+    bool interior[PAL_BODY_MAX];        /* with the values inside */
+    uint64_t sent_field[PAL_BODY_MAX], sent_interior[PAL_BODY_MAX]; /* numbers of the last values sent */
+    bool estimate[PAL_BODY_MAX], estimate_due[PAL_BODY_MAX];        /* subscribed; due */
     /* statistics */
     uint64_t n_byte, n_cycle, n_skipped;
     uint64_t status_byte, status_ns;                      /* at the last status */
@@ -183,8 +184,8 @@ typedef struct pal_hub_room {
     uint64_t left_step;   /* where the session went on live */
     bool reported_far;    /* an estimate above the scene's tolerance has been reported */
     int tier_users[PAL_STREAM_TIER_COUNT];
-    int n_subscriber[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* clients subscribed to a field */
-    bool reported[PAL_BODY_MAX][PAL_FIELD_COUNT];    /* the session has been asked for it */
+    pal_stream_subscribers subscribers;
+    bool reported[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* the session has been asked for it */
 } pal_hub_room;
 
 typedef struct pal_hub_count {

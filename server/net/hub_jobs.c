@@ -266,6 +266,7 @@ static void send_topology(pal_hub_room *room)
         pal_hub_put_plan(room, &topology->plan);
         memset(c->sent_change, 0, sizeof c->sent_change);
         memset(c->sent_field, 0, sizeof c->sent_field);
+        memset(c->sent_interior, 0, sizeof c->sent_interior);
         pal_hub_send(c);
     }
 }

@@ -34,19 +34,24 @@ void pal_hub_update_subscriptions(pal_hub_room *room)
         request(room->session, room->n_estimate[b] > 0, &room->estimate_requested[b],
                 (pal_command){.kind = PAL_COMMAND_ESTIMATE, .body = b});
         for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++)
-            request(room->session, room->n_subscriber[b][k] > 0, &room->reported[b][k],
+            request(room->session, room->subscribers.n_field[b][k] > 0, &room->reported[b][k],
                     (pal_command){.kind = PAL_COMMAND_FIELD, .body = b, .field = (pal_field)k});
     }
 }
 
-void pal_hub_set_field(pal_client *c, int part, pal_field field)
+void pal_hub_set_field(pal_client *c, int part, pal_field field, bool interior)
 {
-    pal_field before = (pal_field)c->view[part];
-    if (field == before) return;
-    if (before != PAL_FIELD_NONE) c->room->n_subscriber[part][before]--;
-    if (field != PAL_FIELD_NONE) c->room->n_subscriber[part][field]++;
+    const pal_field before = (pal_field)c->view[part];
+    pal_stream_subscribers *of = &c->room->subscribers;
+    interior = interior && field != PAL_FIELD_NONE;
+    of->n_field[part][before] -= before != PAL_FIELD_NONE;
+    of->n_field[part][field] += field != PAL_FIELD_NONE;
+    of->n_interior[part][before] -= c->interior[part];
+    of->n_interior[part][field] += interior;
+    if (field != before) c->sent_field[part] = 0;
+    if (field != before || !interior) c->sent_interior[part] = 0;
     c->view[part] = (uint8_t)field;
-    c->sent_field[part] = 0;
+    c->interior[part] = interior;
 }
 
 void pal_hub_set_estimate(pal_client *c, int body, bool wanted)
@@ -60,7 +65,7 @@ void pal_hub_set_estimate(pal_client *c, int body, bool wanted)
 static void unsubscribe_all(pal_client *c)
 {
     for (int b = 0; b < c->room->stream->n_part; b++) {
-        pal_hub_set_field(c, b, PAL_FIELD_NONE);
+        pal_hub_set_field(c, b, PAL_FIELD_NONE, false);
         pal_hub_set_estimate(c, b, false);
     }
     pal_hub_update_subscriptions(c->room);

@@ -2,7 +2,7 @@
 #include "server/net/stream.h"
 
 #include "protocol/asset.h"
-#include "protocol/field_codec.h"
+#include "protocol/interior_codec.h"
 #include "server/base/clock.h"
 #include "server/base/log.h"
 #include "server/base/vec3.h"
@@ -21,6 +21,61 @@ static pal_err refuse(pal_diagnostic *diag, int refusal, const char *part, const
 {
     return pal_diagnostic_set(diag, refusal == PAL_REFUSAL_MEMORY ? PAL_ERR_MEMORY : PAL_ERR_REFUSED, "part %s: %s: %s",
                               part, what, pal_refusal_text(refusal));
+}
+
+static void drop_fields(pal_stream_part *part)
+{
+    for (int k = 0; k < PAL_FIELD_COUNT; k++) {
+        pal_packet_drop(part->field[k].packet);
+        pal_packet_drop(part->interior[k].packet);
+    }
+    pal_packet_drop(part->interior_asset);
+}
+
+/* Positions are sent as displacements, so that the order of nodes is any: their own. A tetrahedron a b c d is written
+ * as two of its faces, a b c and c b d */
+static int encode_interior(const pal_shown *shown, uint8_t **bytes, size_t *n_byte)
+{
+    const uint32_t n = (uint32_t)shown->n_node, n_tet = (uint32_t)shown->n_tet;
+    pal_frame_order *order = pal_frame_order_allocate(n, 1);
+    float *rest_m = malloc(3 * sizeof *rest_m * n);
+    uint32_t *face = malloc(6 * sizeof *face * n_tet);
+    int refusal = order && rest_m && face ? 0 : PAL_REFUSAL_MEMORY;
+    for (uint32_t i = 0; i < n && !refusal; i++) {
+        order->vertex_of[i] = i;
+        for (uint32_t c = 0; c < 3; c++)
+            rest_m[3 * i + c] = (float)(shown->node_rest_m[3 * i + c] + shown->offset_m[c]);
+    }
+    for (uint32_t t = 0; t < n_tet && !refusal; t++) {
+        static const int corner[6] = {0, 1, 2, 2, 1, 3};
+        for (uint32_t c = 0; c < 6; c++) face[6 * t + c] = (uint32_t)shown->tet[4 * t + (uint32_t)corner[c]];
+    }
+    if (!refusal) {
+        order->level_begin[0] = 0, order->level_begin[1] = n;
+        refusal = pal_asset_encode(rest_m, order, face, 2 * n_tet, bytes, n_byte);
+    }
+    free(rest_m);
+    free(face);
+    pal_frame_order_destroy(order);
+    return refusal;
+}
+
+static pal_err open_interior(pal_stream_part *part, const pal_shown *shown, pal_diagnostic *diag)
+{
+    uint8_t *bytes = NULL;
+    size_t n_byte = 0;
+    char hash[PAL_ASSET_HASH_CHARS];
+    if (shown->n_tet == 0 || shown->n_tet > PAL_INTERIOR_TETS) return PAL_ERR_OK;
+    const int refusal = encode_interior(shown, &bytes, &n_byte);
+    if (refusal)
+        return pal_diagnostic_set(diag, refusal == PAL_REFUSAL_MEMORY ? PAL_ERR_MEMORY : PAL_ERR_REFUSED,
+                                  "part %s: no asset of its interior: %s", shown->name, pal_refusal_text(refusal));
+    part->interior_asset = pal_packet_create(bytes, n_byte, false);
+    pal_asset_hash(bytes, n_byte, hash);
+    snprintf(part->info.interior, sizeof part->info.interior, "/asset/%s", hash);
+    part->n_node = (uint32_t)shown->n_node;
+    free(bytes);
+    return part->interior_asset ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 /* builds the asset and encoders of one part */
@@ -57,7 +112,9 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
         part->info.n_triangle = (uint32_t)shown->n_tri;
         part->info.is_adaptive = shown->is_adaptive;
         part->info.is_sculptable = shown->face != NULL;
-        if (shown->is_adaptive) err = pal_triangle_slots_make(index, part->info.epoch, shown, diag, &part->slots);
+        err = open_interior(part, shown, diag);
+        if (!err && shown->is_adaptive)
+            err = pal_triangle_slots_make(index, part->info.epoch, shown, diag, &part->slots);
         for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++)
             if (pal_session_has_field(s->session, index, (pal_field)k))
                 pal_plain_text(part->info.field[part->info.n_field++], PAL_WIRE_FIELD_BYTES,
@@ -96,7 +153,6 @@ static pal_err open_parts(pal_stream *s, double error_m, pal_diagnostic *diag)
     if (error_m > 0) s->error_m = error_m;
     for (int p = 0; p < s->n_part; p++) s->part[p].info.error_m = s->error_m;
     s->cap = pal_frame_bound(max);
-    if (s->cap < pal_field_bound(max)) s->cap = pal_field_bound(max);
     if (s->cap < PAL_WIRE_TOOLS_MAX) s->cap = PAL_WIRE_TOOLS_MAX;
     s->buffer = malloc(s->cap);
     return s->buffer ? PAL_ERR_OK : PAL_ERR_MEMORY;
@@ -124,7 +180,7 @@ void pal_stream_close(pal_stream *stream)
     for (int p = 0; p < stream->n_part; p++) {
         pal_packet_drop(stream->part[p].asset);
         pal_triangle_slots_free(stream->part[p].slots);
-        for (int k = 0; k < PAL_FIELD_COUNT; k++) pal_packet_drop(stream->part[p].field[k]);
+        drop_fields(&stream->part[p]);
         for (int t = 0; t < PAL_STREAM_TIER_COUNT; t++) {
             pal_packet_drop(stream->part[p].frame[t]);
             pal_frame_encoder_destroy(stream->encoder[p][t]);
@@ -393,57 +449,71 @@ bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_
     return true;
 }
 
-/* encodes one message of the newest values; work is scratch, allocated for the call */
-static bool encode_field(pal_stream *s, int p, int k, uint64_t now_ns)
+/* one message of the newest values; buffers are those of the call */
+static pal_packet *encode_field(const pal_stream *s, int p, int k, bool inside)
 {
-    pal_stream_part *part = &s->part[p];
+    const pal_stream_part *part = &s->part[p];
     const pal_frame_field *from = &s->frame->part[p].field[k];
-    pal_field_head head = {.part = (uint16_t)p,
-                           .field = (pal_wire_field)k,
-                           .epoch = part->info.epoch,
-                           .sim_time_us = time_us(from->time_s),
-                           .n_vertex = part->info.n_vertex};
-    uint8_t *work = malloc(part->info.n_vertex);
+    const uint32_t n = inside ? part->n_node : part->info.n_vertex;
+    const size_t cap = inside ? pal_interior_bound(n) : pal_field_bound(n);
     size_t n_byte = 0;
-    int refusal = work ? pal_field_put(from->value, &head, work, s->buffer, s->cap, &n_byte) : PAL_REFUSAL_MEMORY;
+    uint8_t *work = malloc(cap + PAL_INTERIOR_NODE_BYTES * (size_t)n),
+            *dst = work + PAL_INTERIOR_NODE_BYTES * (size_t)n;
+    if (!work) return NULL;
+    pal_field_head head = {(uint16_t)p, (pal_wire_field)k, part->info.epoch, time_us(from->time_s), .n_vertex = n};
+    pal_interior_head interior = {(uint16_t)p, (pal_wire_field)k, part->info.epoch, time_us(from->time_s), .n_node = n};
+    /* twice the error of frames: nobody sees a slice move by a tenth of a millimetre */
+    interior.q_m = (float)(4 * part->info.error_m);
+    const int refusal = inside ? pal_interior_put(from->node, &interior, work, dst, cap, &n_byte)
+                               : pal_field_put(from->value, &head, work, dst, cap, &n_byte);
+    pal_packet *packet = refusal ? NULL : pal_packet_create(dst, n_byte, false);
     free(work);
-    pal_packet *packet = refusal ? NULL : pal_packet_create(s->buffer, n_byte, false);
+    return packet;
+}
+
+static bool make_field(pal_stream *s, int p, int k, bool inside, uint64_t now_ns)
+{
+    pal_stream_values *to = inside ? &s->part[p].interior[k] : &s->part[p].field[k];
+    pal_packet *packet = encode_field(s, p, k, inside);
+    double apart_s = 1 / PAL_STREAM_FIELD_HZ;
+    if (inside && packet && (double)packet->n_byte / PAL_INTERIOR_BYTES_S > apart_s)
+        apart_s = (double)packet->n_byte / PAL_INTERIOR_BYTES_S;
     /* a slightly late message does not delay the next, so the mean rate is kept and exceeded only briefly */
-    uint64_t *due = &part->field_due_ns[k], apart = (uint64_t)(1e9 / PAL_STREAM_FIELD_HZ), slack = apart / 10;
-    *due = now_ns > *due + slack ? now_ns + apart - slack : *due + apart;
-    part->field_revision[k] = from->revision;
+    uint64_t apart = (uint64_t)(1e9 * apart_s), slack = apart / 10;
+    to->due_ns = now_ns > to->due_ns + slack ? now_ns + apart - slack : to->due_ns + apart;
+    to->revision = s->frame->part[p].field[k].revision;
     if (!packet) return false;
-    pal_packet_replace(&part->field[k], packet);
-    part->field_made[k] = ++s->field_seq;
+    pal_packet_replace(&to->packet, packet);
+    to->made = ++s->field_seq;
     s->count.n_field++;
     return true;
 }
 
-static void forget_field(pal_stream_part *part, int k)
+/* values of one kind; true: new ones */
+static bool update_field(pal_stream *s, int p, int k, bool inside, int n_subscriber, uint64_t now_ns, uint64_t *due_ns)
 {
-    pal_packet_replace(&part->field[k], NULL);
-    part->field_made[k] = part->field_revision[k] = 0;
+    pal_stream_values *to = inside ? &s->part[p].interior[k] : &s->part[p].field[k];
+    const pal_frame_field *from = s->frame ? &s->frame->part[p].field[k] : NULL;
+    if (n_subscriber == 0) {
+        pal_packet_replace(&to->packet, NULL);
+        to->made = to->revision = 0;
+        return false;
+    }
+    if (!from || !(inside ? from->node : from->value) || !from->revision || from->revision == to->revision)
+        return false;
+    if (now_ns >= to->due_ns) return make_field(s, p, k, inside, now_ns);
+    if (!*due_ns || to->due_ns < *due_ns) *due_ns = to->due_ns;
+    return false;
 }
 
-bool pal_stream_fields(pal_stream *stream, uint64_t now_ns, int n_subscriber[PAL_BODY_MAX][PAL_FIELD_COUNT],
-                       uint64_t *due_ns)
+bool pal_stream_fields(pal_stream *stream, uint64_t now_ns, const pal_stream_subscribers *of, uint64_t *due_ns)
 {
     bool any = false;
     *due_ns = 0;
     for (int p = 0; p < stream->n_part; p++)
         for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++) {
-            pal_stream_part *part = &stream->part[p];
-            const pal_frame_field *from = stream->frame ? &stream->frame->part[p].field[k] : NULL;
-            if (n_subscriber[p][k] == 0) {
-                if (part->field_revision[k]) forget_field(part, k);
-                continue;
-            }
-            if (!from || !from->value || !from->revision || from->revision == part->field_revision[k]) continue;
-            uint64_t due = part->field_due_ns[k];
-            if (now_ns >= due)
-                any = encode_field(stream, p, k, now_ns) || any;
-            else if (!*due_ns || due < *due_ns)
-                *due_ns = due;
+            any = update_field(stream, p, k, false, of->n_field[p][k], now_ns, due_ns) || any;
+            any = update_field(stream, p, k, true, of->n_interior[p][k], now_ns, due_ns) || any;
         }
     return any;
 }

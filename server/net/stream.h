@@ -18,6 +18,14 @@
 
 enum { PAL_STREAM_TIER_COUNT = 3 }; /* bounds of positions: error_m times PAL_TIER_FACTORS */
 
+/* newest values of a field; of its vertices (FIELD) or of its interior (INTERIOR) */
+typedef struct pal_stream_values {
+    pal_packet *packet; /* NULL: no subscriber or none yet          */
+    uint64_t made;      /* a new number for every message           */
+    uint64_t revision;  /* of the last encoding                     */
+    uint64_t due_ns;    /* earliest time of the next encoding       */
+} pal_stream_values;
+
 typedef struct pal_stream_part {
     pal_wire_part_info info;
     pal_packet *asset;
@@ -27,10 +35,9 @@ typedef struct pal_stream_part {
     uint32_t frame_change[PAL_STREAM_TIER_COUNT]; /* triangle table that it belongs to (pal_triangle_slots.change) */
     uint64_t frame_output[PAL_STREAM_TIER_COUNT]; /* pal_frame_part.n_output of the last encoding */
     pal_triangle_slots *slots;                    /* of an adaptive part, else NULL */
-    pal_packet *field[PAL_FIELD_COUNT];           /* newest values; NULL: no subscriber or none yet */
-    uint64_t field_made[PAL_FIELD_COUNT];         /* a new number for every message */
-    uint64_t field_revision[PAL_FIELD_COUNT];     /* of the last encoding */
-    uint64_t field_due_ns[PAL_FIELD_COUNT];       /* earliest time of the next encoding */
+    pal_stream_values field[PAL_FIELD_COUNT], interior[PAL_FIELD_COUNT];
+    pal_packet *interior_asset; /* NULL: no interior */
+    uint32_t n_node;            /* of the interior */
 } pal_stream_part;
 
 typedef struct pal_stream_count { /* totals for metrics */
@@ -95,10 +102,13 @@ int pal_stream_devices(const pal_stream *stream, const pal_stream_tool tool[PAL_
  * models. now_ns: time of the session's clock. false: no new frame. */
 bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_STREAM_TIER_COUNT],
                        const pal_stream_tool tool[PAL_TOOL_MAX]);
-/* Encodes the newest values of every field with n_subscriber > 0 clients and drops the others. true: new values;
- * *due_ns: time of the next call for values that came too early, 0: none. */
-bool pal_stream_fields(pal_stream *stream, uint64_t now_ns, int n_subscriber[PAL_BODY_MAX][PAL_FIELD_COUNT],
-                       uint64_t *due_ns);
+/* clients subscribed to a field, and those of them that take its interior */
+typedef struct pal_stream_subscribers {
+    int n_field[PAL_BODY_MAX][PAL_FIELD_COUNT], n_interior[PAL_BODY_MAX][PAL_FIELD_COUNT];
+} pal_stream_subscribers;
+/* Encodes the newest values that have subscribers and drops the others. true: new values; *due_ns: time of the next
+ * call for values that came too early, 0: none. */
+bool pal_stream_fields(pal_stream *stream, uint64_t now_ns, const pal_stream_subscribers *of, uint64_t *due_ns);
 /* Starts a tier for its first client: re-encodes its frames from the newest positions (same cycle). Their numbers
  * exceed those of every tier, because a client requires increasing numbers (protocol/README.md, "FRAME"). */
 void pal_stream_begin_tier(pal_stream *stream, int tier);

@@ -50,6 +50,10 @@
 /* Hz, at most: cycles, which displays cannot show faster; values of a field, which are colours (test_hub) */
 #define PAL_STREAM_RATE_HZ  120.0
 #define PAL_STREAM_FIELD_HZ 10.0
+/* bytes a second of one interior, which limits the rate of large ones: as much as the frames of an organ that is
+ * pulled; and tetrahedra, of more of which no page makes slices in time (test_fields_hub) */
+#define PAL_INTERIOR_BYTES_S 4e5
+#define PAL_INTERIOR_TETS    1000000
 /* default bound of positions: m, below what a display resolves, and the number of such bounds in the longest side of
  * the box of a smaller scene (test_hub) */
 #define PAL_POSITION_ERROR_M    5e-5

@@ -37,8 +37,16 @@ const figures = (page) =>
             note: document.querySelector("#field option:disabled")?.textContent ?? "",
         };
     });
-/** the newest values and colours are in the picture */
-const drawn = (page) => until(() => page.evaluate(() => !window.palpate.stage.dirty && window.palpate.stage.ready()));
+/** the newest values and colours are in the picture: it has been drawn twice since */
+const drawn = async (page) => {
+    const count = () =>
+        page.evaluate(() => {
+            window.palpate.stage.dirty = true;
+            return window.palpate.stage.renderer.info.render.frame;
+        });
+    const before = await count();
+    await until(count, (now) => now > before + 1);
+};
 const choose = (page, name) =>
     page.evaluate((value) => {
         const list = document.querySelector("#field");
@@ -50,6 +58,85 @@ const pull = async (page, pixel, steps) => {
     await page.mouse.down();
     await drag(page, pixel, 7, -8, steps);
 };
+
+/** the n-th section plane: a direction, and a place from 0 to 1 */
+const setPlane = (page, n, direction, at) =>
+    page.evaluate(
+        ([i, chosen, place]) => {
+            const row = document.querySelectorAll("#inside-planes div")[i];
+            const [list, slider] = [row.querySelector("select"), row.querySelector("input")];
+            list.value = chosen;
+            list.dispatchEvent(new Event("change"));
+            slider.value = String(place);
+            slider.dispatchEvent(new Event("input"));
+        },
+        [n, direction, at],
+    );
+const insideNow = (page) =>
+    page.evaluate(() => {
+        const { inside, state } = window.palpate;
+        const interior = [...inside.interiors.values()][0];
+        const caps = [...(inside.section?.caps.values() ?? [])];
+        // in a displacement, each node's value is its distance from rest
+        let off = 0;
+        for (let i = 0; interior && i < interior.value.length; i++) {
+            const d = [0, 1, 2].map((c) => interior.x[3 * i + c] - interior.rest[3 * i + c]);
+            off = Math.max(off, Math.abs(Math.hypot(...d) - interior.value[i]));
+        }
+        return {
+            field: interior?.field,
+            wanted: state.field,
+            off,
+            bound: interior ? (interior.high - interior.low) / 255 + 4e-4 : 0,
+            caps: caps.length,
+            corners: caps.map((cap) => cap.sliced?.n ?? 0),
+            clipped: [...state.bodies.values()].map((body) => body.mesh.material.clippingPlanes?.length ?? 0),
+        };
+    });
+
+/** sections of a body that is being pulled, with its displacement inside */
+async function checkInside(page, name) {
+    await choose(page, "displacement");
+    await page.keyboard.press("i");
+    check(`${name}: key I opens the section planes`, await page.isVisible("#inside"));
+    let now = await insideNow(page);
+    check(`${name}: without a plane nothing is loaded or cut`, now.caps === 0 && now.field === undefined);
+    await setPlane(page, 0, "view", 0.5);
+    now = await until(
+        () => insideNow(page),
+        (i) => i.field === "displacement" && i.corners[0] > 0,
+    );
+    check(
+        `${name}: a plane that faces the viewer cuts the body, and its cap has values from inside`,
+        now.caps === 1 && now.clipped[0] === 1 && now.corners[0] > 30,
+        `${now.corners[0]} corners`,
+    );
+    check(`${name}: nodes inside moved by their displacement`, now.off <= now.bound, `${now.off} m`);
+    await choose(page, name === "fem" ? "von_mises" : "strain");
+    await until(
+        () => insideNow(page),
+        (i) => i.field === i.wanted,
+    );
+    await drawn(page);
+    await page.screenshot({ path: join(pictures, `inside_${name}.png`) });
+    await setPlane(page, 1, "x", 0.55);
+    await setPlane(page, 2, "z", 0.4);
+    now = await until(
+        () => insideNow(page),
+        (i) => i.caps === 3 && i.clipped[0] === 3,
+    );
+    check(`${name}: three planes remove a corner`, now.caps === 3 && now.clipped[0] === 3);
+    await drawn(page);
+    await page.screenshot({ path: join(pictures, `inside_${name}_corner.png`) });
+    for (const n of [0, 1, 2]) await setPlane(page, n, "none", 0.5);
+    now = await until(
+        () => insideNow(page),
+        (i) => i.caps === 0,
+    );
+    check(`${name}: without planes the body is whole again`, now.caps === 0 && now.clipped[0] === 0);
+    await page.keyboard.press("i");
+    check(`${name}: key I closes the section planes`, await page.isHidden("#inside"));
+}
 
 /** pulls the organ and displays fields of its model; the pictures have its name */
 async function checkFields(name, scene, wanted, offered = wanted) {
@@ -102,6 +189,7 @@ async function checkFields(name, scene, wanted, offered = wanted) {
         await drawn(page);
         await page.screenshot({ path: join(pictures, `field_${name}_${field}.png`) });
     }
+    await checkInside(page, name);
     // a long pull: the range follows
     await choose(page, "displacement");
     await page.mouse.move(pixel.x + 160, pixel.y - 200, { steps: 8 });

@@ -5,6 +5,7 @@
 #include "protocol/control.h"
 #include "protocol/field_codec.h"
 #include "protocol/frame_codec.h"
+#include "protocol/interior_codec.h"
 #include "protocol/topology_delta_codec.h"
 #include "tests/check.h"
 #include "tests/net/mem_transport.h"
@@ -14,9 +15,10 @@ typedef struct mem_client {
     pal_mem_peer *peer;
     pal_control last[PAL_CONTROL_COUNT]; /* newest of each type */
     int n_text[PAL_CONTROL_COUNT];
-    int n_frame, n_tools, n_haptic, n_field, n_bad;
-    uint32_t epoch; /* of the asset */
-    int n_old;      /* frames and fields of an older one: ignored */
+    int n_frame, n_tools, n_haptic, n_field, n_interior, n_bad;
+    pal_interior_head interior; /* of the last message */
+    uint32_t epoch;             /* of the asset */
+    int n_old;                  /* frames and fields of an older one: ignored */
     pal_frame_head frame;
     pal_wire_tools tools;
     pal_wire_haptic haptic;
@@ -169,6 +171,9 @@ static inline void mem_take_binary(mem_client *c, const pal_packet *p)
         }
         c->n_field++;
         if (!c->level || pal_field_get(p->bytes, p->n_byte, c->asset->order->n_vertex, &c->field, c->level)) c->n_bad++;
+    } else if (head.kind == PAL_WIRE_INTERIOR) {
+        c->n_interior++;
+        if (pal_interior_get_head(p->bytes, p->n_byte, &c->interior)) c->n_bad++;
     } else {
         c->n_haptic++;
         if (pal_wire_get_haptic(p->bytes, p->n_byte, &c->haptic)) c->n_bad++;

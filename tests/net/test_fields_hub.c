@@ -119,6 +119,51 @@ static void a_client_that_acknowledges_nothing_gets_no_more_fields(void)
     end();
 }
 
+/* the asset names the tetrahedra, messages come to those who ask for them only, at most ten a second */
+static void the_interior_goes_only_to_those_who_ask_for_it(void)
+{
+    mem_client ada, bob;
+    pal_reply reply;
+    pal_asset *asset = NULL;
+    begin(false);
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&bob, transport, "Bob", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    UNTIL(ada.n_tools > 2 && bob.n_tools > 2, &ada, &bob);
+    pal_mem_get(ada.transport, ada.last[PAL_CONTROL_HELLO].hello.part[0].interior, &reply);
+    REQUIRE(reply.body && !pal_asset_decode(reply.body->bytes, reply.body->n_byte, &asset));
+    CHECK_INT(asset->n_triangle, 2 * (uint32_t)organ.mesh.tets.n_tet);
+    CHECK_INT(asset->order->n_vertex, (uint32_t)organ.mesh.tets.n_node);
+    for (uint32_t t = 0; t < asset->n_triangle / 2; t++) {
+        const uint32_t *face = asset->triangle + 6 * (size_t)t;
+        const int32_t *tet = organ.mesh.tets.tet + 4 * (size_t)t;
+        CHECK(face[0] == (uint32_t)tet[0] && face[1] == (uint32_t)tet[1] && face[2] == (uint32_t)tet[2]);
+        CHECK(face[3] == face[2] && face[4] == face[1] && face[5] == (uint32_t)tet[3]);
+    }
+    mem_text(&ada, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\",\"interior\":true}");
+    mem_text(&bob, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}");
+    UNTIL(ada.n_interior > 0 && bob.n_field > 3, &ada, &bob);
+    CHECK_INT(ada.interior.n_node, asset->order->n_vertex);
+    CHECK_INT(ada.interior.field, PAL_WIRE_FIELD_DISPLACEMENT_M);
+    CHECK_INT(bob.n_interior, 0);
+    mem_text(&bob, "{\"type\":\"command\",\"verb\":\"reset\"}");
+    for (int i = 0; i < 60; i++) turn(&ada, &bob);
+    const int before = ada.n_interior;
+    for (int i = 0; i < 120; i++) turn(&ada, &bob); /* 2 s */
+    CHECK(ada.n_interior - before <= 21);
+    mem_text(&ada, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}");
+    for (int i = 0; i < 20; i++) turn(&ada, &bob);
+    const int ended = ada.n_interior, field = ada.n_field;
+    mem_text(&bob, "{\"type\":\"command\",\"verb\":\"reset\"}");
+    UNTIL(ada.n_field > field, &ada, &bob);
+    CHECK_INT(ada.n_interior, ended);
+    CHECK_INT(ada.n_bad + bob.n_bad, 0);
+    pal_asset_destroy(asset);
+    pal_packet_drop(reply.body);
+    mem_end(&ada);
+    mem_end(&bob);
+    end();
+}
+
 static void what_cannot_be_shown_is_answered_with_a_sentence(void)
 {
     static const struct {
@@ -152,6 +197,7 @@ int main(void)
     RUN(a_field_goes_only_to_those_who_ask_and_ends_with_them);
     RUN(a_field_comes_while_paused_and_is_not_sent_twice);
     RUN(a_client_that_acknowledges_nothing_gets_no_more_fields);
+    RUN(the_interior_goes_only_to_those_who_ask_for_it);
     RUN(what_cannot_be_shown_is_answered_with_a_sentence);
     pal_prepared_free(&organ.mesh);
     return check_report();

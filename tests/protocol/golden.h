@@ -291,7 +291,7 @@ static inline void golden_control(pal_control_type type, pal_control *c)
         c->tool = 2;
         break;
     case PAL_CONTROL_SUBSCRIBE_FIELD:
-        c->field_subscription = (pal_wire_field_subscription){1, "von_mises"};
+        c->field_subscription = (pal_wire_field_subscription){1, "von_mises", false};
         break;
     case PAL_CONTROL_PING:
     case PAL_CONTROL_PONG:

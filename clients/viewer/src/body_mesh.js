@@ -61,7 +61,8 @@ export class BodyMesh {
         this.takeTriangles(triangles);
         this.mesh = new THREE.Mesh(this.geometry, makeTissue(this.colours.uniforms));
         this.colours.material = this.mesh.material;
-        if (isClosed(rest, triangles)) this.mesh.material.side = THREE.FrontSide;
+        this.closed = isClosed(rest, triangles);
+        if (this.closed) this.mesh.material.side = THREE.FrontSide;
         this.mesh.frustumCulled = false;
         this.mesh.visible = false;
         // the surface lies slightly behind its lines

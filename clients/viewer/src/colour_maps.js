@@ -30,6 +30,16 @@ export const DIVERGING = Object.freeze([
 /** stops of each map, as shaders have them */
 export const STOPS = SEQUENTIAL.length;
 
+/** GLSL: the colour of a share of the range, from the stops in `mapStops`, linear light */
+export const MAP_COLOUR = `
+uniform vec3 mapStops[${STOPS}];
+vec3 mapColour(float t) {
+  float s = clamp(t, 0.0, 1.0) * ${(STOPS - 1).toFixed(1)};
+  vec3 c = mapStops[0];
+  for (int i = 0; i < ${STOPS - 1}; i++) c = mix(c, mapStops[i + 1], clamp(s - float(i), 0.0, 1.0));
+  return c;
+}`;
+
 /** as a background of CSS, from left to right @param {readonly string[]} map */
 export const gradientOf = (map) => `linear-gradient(90deg, ${map.join(", ")})`;
 

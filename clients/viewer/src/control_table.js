@@ -13,6 +13,7 @@ const part = /** @type {const} */ ({
     asset: "text",
     error_m: "f64",
     "fields?": "texts",
+    "interior?": "text",
     "adaptive?": "bool",
     "sculptable?": "bool",
 });
@@ -166,7 +167,7 @@ export const CLIENT_MESSAGES = Object.freeze(
         take_tool: { tool: "tool" },
         release_tool: {},
         ping: { stamp_ms: "f64" },
-        subscribe_field: { part: "u32", field: "text" },
+        subscribe_field: { part: "u32", field: "text", "interior?": "bool" },
     }),
 );
 

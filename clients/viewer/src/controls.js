@@ -13,6 +13,7 @@ const ROLL_RAD = Math.PI / 12; // turn of the instrument for a key press
  * @typedef {{
  *   state: import("./app_state.js").AppState, stage: import("./stage.js").Stage, layout: import("./layout.js").Layout,
  *   input: import("./tool_input.js").ToolInput, fields: import("./field_display.js").FieldDisplay,
+ *   inside: import("./inside.js").Inside,
  *   accuracy: import("./accuracy_panel.js").AccuracyPanel, sculpt: import("./sculpt_panel.js").SculptPanel,
  *   send: (message: import("./control_table.js").ClientMessage) => void, showFigures: () => void
  * }} Page the parts of the page that the controls act on
@@ -55,6 +56,7 @@ export class Controls {
                 m: () => this.toggleMesh(),
                 q: () => input.roll(-ROLL_RAD),
                 w: () => input.roll(ROLL_RAD),
+                i: () => this.page.inside.toggle(),
                 "?": () => this.openHelp(),
                 f1: () => this.openHelp(),
                 escape: () => this.closePanels(),

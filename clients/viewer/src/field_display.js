@@ -18,6 +18,9 @@ export class FieldDisplay {
         this.stage = stage;
         this.send = send;
         this.layout = layout;
+        /** @type {import("./inside.js").Inside | null} set by itself */
+        this.inside = null;
+        this.interior = false; // are values inside wanted?
         this.share = 0; // of the colours, see shareOf
         this.list = selectById("field");
         this.list.onchange = () => this.choose(this.list.value);
@@ -27,12 +30,21 @@ export class FieldDisplay {
     subscribe() {
         this.state.parts.forEach((part, i) => {
             if (!part.fields) return;
+            const field = part.fields.includes(this.state.field) ? this.state.field : "none";
             this.send({
                 type: "subscribe_field",
                 part: i,
-                field: part.fields.includes(this.state.field) ? this.state.field : "none",
+                field,
+                ...(this.interior && part.interior && { interior: true }),
             });
         });
+    }
+
+    /** @param {boolean} wanted values inside the bodies */
+    setInterior(wanted) {
+        if (wanted === this.interior) return;
+        this.interior = wanted;
+        if (this.state.field !== "none") this.subscribe();
     }
 
     /** @param {string} name of a field, or "none" */
@@ -90,6 +102,7 @@ export class FieldDisplay {
         const bodies = [...this.state.bodies.values()];
         const values = bodies.flatMap((body) => body.colours.values ?? []);
         if (values.length === 0) return;
+        values.push(...(this.inside?.ranges() ?? []));
         const former = this.state.range;
         const low = Math.min(...values.map((v) => v.low));
         const high = Math.max(...values.map((v) => v.high));

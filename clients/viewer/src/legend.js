@@ -95,7 +95,7 @@ export function rangeOf(field, low, high, before) {
     const { min, signed } = FIELDS[field];
     const top = Math.max(high, signed ? -low : high, min, Number.MIN_VALUE * 1e16);
     if (signed) {
-        const holds = before && top <= before.high && (top >= KEEP * before.high || top === min);
+        const holds = before && top <= before.high && top >= KEEP * before.high;
         const to = holds ? before.high : (roundUp(top / (INTERVALS / 2)) * INTERVALS) / 2;
         return { low: -to, high: to };
     }
@@ -103,7 +103,7 @@ export function rangeOf(field, low, high, before) {
     const narrow = min === 0 && low > 0 && spread < NARROW * high && spread > CONSTANT * high;
     const next = narrow ? offsetRange(low, high) : rangeFrom(roundUp(top / INTERVALS), 0);
     const contains = before && before.low <= low && top <= before.high * (1 + 1e-9) && before.low > 0 === narrow;
-    const filled = before && (spread >= KEEP * (before.high - before.low) || top >= KEEP * before.high || top === min);
+    const filled = before && (spread >= KEEP * (before.high - before.low) || top >= KEEP * before.high);
     return before && contains && filled ? before : next;
 }
 

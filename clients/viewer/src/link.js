@@ -4,6 +4,7 @@ import { decodeAsset } from "./asset.js";
 import { CommandQueue } from "./command_queue.js";
 import { readControl } from "./control_reader.js";
 import { decodeField, readFieldHead } from "./field_decoder.js";
+import { InteriorLink } from "./interior_link.js";
 import { FrameDecoder, readFrameHead } from "./frame_decoder.js";
 import { vertexNormals } from "./normals.js";
 import { text as textOf } from "./text.js";
@@ -52,6 +53,7 @@ const FINAL = new Map([
  *   | ({type: "part", part: number, epoch: number, rest: Float32Array} & Shown)
  *   | ({type: "frame", part: number, shown: Shown | null} & FrameArrays)
  *   | {type: "field", part: number, name: string, low: number, high: number, level: Uint8Array}
+ *   | import("./interior_link.js").InteriorMesh | import("./interior_link.js").InteriorValues
  *   | {type: "tools", tools: import("./wire.js").Tool[]}
  *   | {type: "silence", seconds: number}
  *   | {type: "figures", figures: LinkFigures}} PageMessage silence: of the server, whole seconds; 0: it answers again
@@ -124,6 +126,7 @@ export class Link {
     /** @param {Environment} env */
     constructor(env) {
         this.env = env;
+        this.interiors = new InteriorLink(env);
         this.figuresAt = env.now();
     }
 
@@ -132,6 +135,7 @@ export class Link {
         this.reportSilence(0);
         this.commands.waiting = [];
         this.parts.clear();
+        this.interiors.reset();
         this.requested.clear();
         this.earlyFrames.clear();
         this.earlyFields.clear();
@@ -275,6 +279,7 @@ export class Link {
         if (head.kind === KIND.FRAME) this.frame(head.index, bytes);
         else if (head.kind === KIND.TOOLS) this.tools(bytes);
         else if (head.kind === KIND.FIELD) this.field(head.index, bytes);
+        else if (head.kind === KIND.INTERIOR) this.interiors.take(head.index, bytes);
         else if (head.kind === KIND.TOPOLOGY_DELTA) this.topologyDelta(head.index, bytes);
     }
 
@@ -311,8 +316,9 @@ export class Link {
         this.env.later(() => generation === this.generation && this.ping(), PING_MS);
     }
 
-    /** @param {number} index @param {{epoch: number, asset: string}} info */
+    /** @param {number} index @param {{epoch: number, asset: string, interior?: string}} info */
     async loadPart(index, info) {
+        this.interiors.offer(index, info, this.options.url.replace(/^ws/, "http"));
         if (this.requested.get(index) === info.epoch) return;
         this.requested.set(index, info.epoch);
         const generation = this.generation;

@@ -9,6 +9,7 @@ import { byId, htmlById, inputById } from "./dom.js";
 import { WRITERS } from "./exporters.js";
 import { FieldDisplay } from "./field_display.js";
 import { forceText } from "./force_text.js";
+import { Inside } from "./inside.js";
 import { Layout } from "./layout.js";
 import { MembersPanel } from "./members_panel.js";
 import { Messages } from "./messages.js";
@@ -48,6 +49,7 @@ const bodies = new BodySet(state, stage, (part, { positions, normals }) =>
 );
 const poses = new PoseSender(state, post, () => stage.size);
 const fields = new FieldDisplay(state, stage, send, layout);
+const inside = new Inside(state, stage, fields);
 const marks = new ToolMarks(stage, htmlById("labels"));
 const panel = new PlanPanel(document, sendCommand);
 const members = new MembersPanel(document, sendCommand, () => performance.now());
@@ -57,7 +59,7 @@ const accuracy = new AccuracyPanel(document, sendCommand);
 const sculpt = new SculptPanel(document, sendCommand, save);
 const input = new ToolInput(
     stage,
-    (ray) => bodies.pick(ray),
+    (ray) => (inside.trim(ray) ? bodies.pick(ray) : null),
     (target) => {
         state.target = target;
         if (!target && layout.pending) layout.place(false);
@@ -69,9 +71,9 @@ const input = new ToolInput(
 input.onClick = (/** @type {number[]} */ position) => sculpt.click(position);
 input.onFirstDrag = () => htmlById("hint").classList.add("gone");
 const showFigures = () => messages.showFigures();
-const controls = new Controls({ state, stage, layout, input, fields, accuracy, sculpt, send, showFigures });
+const controls = new Controls({ state, stage, layout, input, fields, accuracy, sculpt, inside, send, showFigures });
 const panels = { panel, members, accuracy, sculpt, playback, others, controls };
-const messages = new Messages({ state, stage, layout, bodies, fields, input, marks, send, ...panels });
+const messages = new Messages({ state, stage, layout, bodies, fields, inside, input, marks, send, ...panels });
 worker.onmessage = (/** @type {MessageEvent<import("./link.js").PageMessage>} */ { data }) => messages.take(data);
 
 /** @returns {Stage} */
@@ -118,6 +120,7 @@ function draw() {
         for (const body of state.bodies.values()) if (body.colours.blend(now)) stage.dirty = true;
         if (marks.turning) stage.dirty = true;
         if (stage.dirty || others.moving(now)) {
+            inside.update();
             const own = state.plays ? -1 : state.ownTool;
             marks.drawn = state.tools;
             marks.update(
@@ -167,6 +170,6 @@ inputById("name").onchange = () => {
     connect();
 };
 // read-only access for tests and for the console
-Object.defineProperty(window, "palpate", { value: { state, stage, input, marks, accuracy } });
+Object.defineProperty(window, "palpate", { value: { state, stage, input, marks, accuracy, inside } });
 connect();
 draw();

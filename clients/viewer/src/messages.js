@@ -13,6 +13,7 @@ import { sameTools } from "./tool_marks.js";
  * @typedef {{
  *   state: import("./app_state.js").AppState, stage: import("./stage.js").Stage, layout: import("./layout.js").Layout,
  *   bodies: import("./body_set.js").BodySet, fields: import("./field_display.js").FieldDisplay,
+ *   inside: import("./inside.js").Inside,
  *   input: import("./tool_input.js").ToolInput, marks: import("./tool_marks.js").ToolMarks,
  *   panel: import("./plan_panel.js").PlanPanel, members: import("./members_panel.js").MembersPanel,
  *   accuracy: import("./accuracy_panel.js").AccuracyPanel,
@@ -64,6 +65,12 @@ export class Messages {
                 break;
             case "field":
                 fields.takeField(data);
+                break;
+            case "interior_mesh":
+                this.page.inside.takeMesh(data);
+                break;
+            case "interior":
+                this.page.inside.takeValues(data);
                 break;
             case "tools":
                 if (!sameTools(marks.drawn, data.tools, UNSEEN * stage.size)) stage.dirty = true;

@@ -61,7 +61,12 @@ export class Stage {
     constructor(canvas) {
         this.canvas = canvas;
         const software = isSoftwareRenderer();
-        this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !software, powerPreference: "high-performance" });
+        this.renderer = new THREE.WebGLRenderer({
+            canvas,
+            antialias: !software,
+            stencil: true, // caps of sections
+            powerPreference: "high-performance",
+        });
         this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
         this.renderer.toneMappingExposure = 1.0;
         this.scene = new THREE.Scene();

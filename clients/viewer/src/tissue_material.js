@@ -1,6 +1,6 @@
 // The material of tissue: a glossy layer over a soft, slightly translucent body. The shader mixes in the colours of a
 // field, half of them as emission, so that they match the legend on every side.
-import { SEQUENTIAL, STOPS } from "./colour_maps.js";
+import { MAP_COLOUR, SEQUENTIAL } from "./colour_maps.js";
 import * as THREE from "./three.js";
 
 /** with colours highlights are faint: they would hide the values */
@@ -61,13 +61,7 @@ varying float vField;
 varying vec3 vRest;
 uniform float mapMix;
 uniform vec2 mapRange;
-uniform vec3 mapStops[${STOPS}];
-vec3 mapColour(float t) {
-  float s = clamp(t, 0.0, 1.0) * ${(STOPS - 1).toFixed(1)};
-  vec3 c = mapStops[0];
-  for (int i = 0; i < ${STOPS - 1}; i++) c = mix(c, mapStops[i + 1], clamp(s - float(i), 0.0, 1.0));
-  return c;
-}
+${MAP_COLOUR}
 // value noise at rest positions: faint lobules that move with the tissue
 float lattice(vec3 p) { return fract(sin(dot(p, vec3(127.1, 311.7, 74.7))) * 43758.5453); }
 float mottle(vec3 p) {

@@ -4,7 +4,16 @@
 export const PROTOCOL = "palpate.v2";
 export const VERSION = 2;
 export const MAGIC = 0x314c4150;
-export const KIND = Object.freeze({ FRAME: 1, TOOLS: 2, HAPTIC: 3, FIELD: 4, TOPOLOGY_DELTA: 5, POSE: 16, ACK: 17 });
+export const KIND = Object.freeze({
+    FRAME: 1,
+    TOOLS: 2,
+    HAPTIC: 3,
+    FIELD: 4,
+    TOPOLOGY_DELTA: 5,
+    INTERIOR: 6,
+    POSE: 16,
+    ACK: 17,
+});
 export const POSE_FLAG = Object.freeze({
     CONTACT: 1,
     CLUTCHED: 2,

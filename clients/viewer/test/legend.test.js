@@ -56,6 +56,8 @@ test("a body at rest has the smallest range and its natural colour", () => {
     const range = rangeOf("von_mises", 0, 1e-12, null);
     assert.equal(range.high, 10);
     assert.deepEqual(rangeOf("von_mises", 0, 0.2, range), range);
+    assert.equal(rangeOf("von_mises", 0, 0.2, { low: 0, high: 4000 }).high, 10);
+    assert.equal(rangeOf("distortion", 0, 0, { low: -1, high: 1 }).high, 5e-3);
     assert.equal(shareOf("von_mises", 0, 4.9), 0);
     assert.equal(shareOf("von_mises", 0, 7.5), 0.5);
     assert.equal(shareOf("von_mises", 0, 10), 1);

@@ -17,7 +17,7 @@ typedef struct field_output {
     pal_shown_field shown;
     pal_field kind;
     double period_s, next_s;
-    double *sum, *volume_m3; /* NULL: displacement [n_node] */
+    double *volume_m3; /* sums at the nodes are in shown.node; NULL: displacement [n_node] */
     pal_body *body;
     uint64_t revision; /* topology revision at the last values */
 } field_output;
@@ -43,8 +43,9 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     if (!out || !value) return PAL_ERR_MEMORY;
     *out =
         (field_output){.kind = kind, .shown.value = value, .period_s = 1 / rate_hz, .next_s = -INFINITY, .body = body};
-    if (kind != PAL_FIELD_DISPLACEMENT_M && !PAL_NEW_DOUBLES(build->arena, body->n_node, &out->sum, &out->volume_m3))
-        return PAL_ERR_MEMORY;
+    const bool all = PAL_NEW_DOUBLES(build->arena, body->n_node, &out->shown.node) &&
+                     (kind == PAL_FIELD_DISPLACEMENT_M || PAL_NEW_DOUBLES(build->arena, body->n_node, &out->volume_m3));
+    if (!all) return PAL_ERR_MEMORY;
     body->display.field[kind] = &out->shown;
     *self = out;
     return PAL_ERR_OK;
@@ -56,8 +57,12 @@ static float finite_or_0(double value)
     return isfinite(narrow) ? narrow : 0;
 }
 
-static void displacement(const pal_body *body, float *value)
+static void displacement(const pal_body *body, double *nodal, float *value)
 {
+    for (int k = 0; k < pal_body_nodes(body); k++) {
+        size_t i = (size_t)pal_body_point(body, k);
+        nodal[i] = pal_dist3(body->d + 3 * i, body->node_rest + 3 * i);
+    }
     const double *rest = body->display.surface->x;
     int n = body->active ? body->n_active : body->display.n_shown;
     for (int k = 0; k < n; k++) {
@@ -85,15 +90,15 @@ static void measured(field_output *out, const pal_step *step)
 {
     const pal_body *body = step->body;
     size_t n_byte = sizeof(double) * (size_t)body->n_node;
-    memset(out->sum, 0, n_byte);
+    double *sum = out->shown.node;
+    memset(sum, 0, n_byte);
     memset(out->volume_m3, 0, n_byte);
     for (int i = 0; i < step->n_force; i++) {
         const pal_effect *effect = step->force[i].effect;
-        if (effect->inspect.measure)
-            effect->inspect.measure(step->force[i].self, body, out->kind, out->sum, out->volume_m3);
+        if (effect->inspect.measure) effect->inspect.measure(step->force[i].self, body, out->kind, sum, out->volume_m3);
     }
-    for (int i = 0; i < body->n_node; i++) out->sum[i] = out->volume_m3[i] > 0 ? out->sum[i] / out->volume_m3[i] : 0;
-    spread(body, out->sum, out->shown.value);
+    for (int i = 0; i < body->n_node; i++) sum[i] = out->volume_m3[i] > 0 ? sum[i] / out->volume_m3[i] : 0;
+    spread(body, sum, out->shown.value);
 }
 
 static pal_err run(void *self, pal_step *step)
@@ -105,7 +110,7 @@ static pal_err run(void *self, pal_step *step)
         memset(out->shown.value, 0, sizeof(float) * (size_t)step->body->display.n_shown);
     out->revision = step->body->display.revision;
     if (out->kind == PAL_FIELD_DISPLACEMENT_M)
-        displacement(step->body, out->shown.value);
+        displacement(step->body, out->shown.node, out->shown.value);
     else
         measured(out, step);
     out->shown.revision = ++out->body->display.field_revision;

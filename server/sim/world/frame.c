@@ -32,6 +32,7 @@ pal_frame *pal_frame_create(const pal_world *world)
     if (!frame) return NULL;
     frame->slowdown = 1;
     for (int i = 0; i < world->plan.n_body; i++) {
+        frame->part[i].n_node = world->part[i].n_node;
         if (!make_part(&frame->part[frame->n_part++], &world->plan.body[i], world->part[i].n_vertex)) {
             pal_frame_destroy(frame);
             return NULL;
@@ -47,7 +48,10 @@ void pal_frame_destroy(pal_frame *frame)
         free(frame->part[i].position_m);
         free(frame->part[i].slot);
         free(frame->part[i].point_m);
-        for (int k = 0; k < PAL_FIELD_COUNT; k++) free(frame->part[i].field[k].value);
+        for (int k = 0; k < PAL_FIELD_COUNT; k++) {
+            free(frame->part[i].field[k].value);
+            free(frame->part[i].field[k].node);
+        }
     }
     free(frame);
 }
@@ -62,9 +66,12 @@ pal_err pal_frame_fit(pal_frame *frame, const pal_world *world)
             pal_frame_field *field = &part->field[k];
             if ((body->display.field[k] != NULL) == (field->value != NULL)) continue;
             free(field->value);
+            free(field->node);
             *field = (pal_frame_field){0};
-            if (body->display.field[k]) field->value = calloc((size_t)part->n_vertex + 1, sizeof(float));
-            if (body->display.field[k] && !field->value) err = PAL_ERR_MEMORY;
+            if (!body->display.field[k]) continue;
+            field->value = calloc((size_t)part->n_vertex + 1, sizeof(float));
+            if (part->n_node > 0) field->node = calloc(4 * (size_t)part->n_node, sizeof(float));
+            if (!field->value || (part->n_node > 0 && !field->node)) err = PAL_ERR_MEMORY;
         }
     }
     return err;

@@ -14,14 +14,15 @@ enum { PAL_FRAME_COMPONENT_MAX = 64 };
 /* a field in colour; value NULL: not shown */
 typedef struct pal_frame_field {
     float *value;      /* SI [n_vertex]                                      */
+    float *node;       /* displacement x y z, m, and value of each node then; NULL: no interior [n_node][4] */
     uint64_t revision; /* unique to every set of values, never reused */
     double time_s;     /* simulated time of the values */
 } pal_frame_field;
 
 typedef struct pal_frame_part {
-    int n_vertex;
-    float *position_m; /* [n_vertex][3] */
-    uint64_t revision; /* of the topology these positions belong to */
+    int n_vertex, n_node; /* n_node 0: no interior (shown_surface.h) */
+    float *position_m;    /* [n_vertex][3] */
+    uint64_t revision;    /* of the topology these positions belong to */
     bool frozen;
     char reason[PAL_REASON_TEXT]; /* one sentence while frozen, else empty */
     pal_safeguards safeguards;    /* since the body's reset: interventions that kept it within its bounds */

@@ -21,5 +21,10 @@ typedef struct pal_shown {
     const int32_t *parent;
     int n_coarse_tri;
     const int32_t *coarse_tri; /* triangles of the vertices below n_coarse [n_coarse_tri][3] */
+    /* the interior: tetrahedra of nodes, which fields have values for; n_tet 0: the body has none */
+    int n_node, n_tet;
+    const double *node_rest_m; /* scene frame less offset_m                            [n_node][3] */
+    double offset_m[3];
+    const int32_t *tet; /* positive volume at rest                                      [n_tet][4] */
 } pal_shown;
 #endif

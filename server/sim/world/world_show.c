@@ -5,8 +5,18 @@
 #include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
+
+static void copy_nodes(const pal_body *body, const double *value, int n_node, float *to)
+{
+    for (int i = 0; i < n_node; i++, to += 4) {
+        for (int c = 0; c < 3; c++) to[c] = (float)(body->d[3 * i + c] - body->node_rest[3 * i + c]);
+        to[3] = (float)value[i];
+        for (int c = 0; c < 4; c++) to[c] = isfinite(to[c]) ? to[c] : 0;
+    }
+}
 
 static void copy_fields(const pal_body *body, pal_frame_part *to)
 {
@@ -15,6 +25,7 @@ static void copy_fields(const pal_body *body, pal_frame_part *to)
         pal_frame_field *field = &to->field[k];
         if (!from || !field->value || field->revision == from->revision) continue;
         memcpy(field->value, from->value, sizeof(float) * (size_t)to->n_vertex);
+        if (field->node) copy_nodes(body, from->node, to->n_node, field->node);
         field->revision = from->revision;
         field->time_s = from->time_s;
     }

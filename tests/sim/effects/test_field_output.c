@@ -279,6 +279,37 @@ static void refuses_what_the_model_does_not_give_with_a_sentence(void)
     tool_scene_close(&s);
 }
 
+/* what slices are made of: a displacement that is linear in space is that at every node, and its strain everywhere */
+static void nodes_inside_have_the_linear_displacement_and_its_strain(void)
+{
+    static const double f[9] = {1.05, 0.1, 0, 0, 0.97, 0, 0, 0, 1.02};
+    tool_scene s;
+    REQUIRE(slab_scene(&s, 4, 3, 2, 0.01, 1, 0.01, 15) && tool_scene_open(&s));
+    pal_shown shown;
+    pal_world_shown(s.world, 0, &shown);
+    CHECK_INT(shown.n_tet, s.mesh.tets.n_tet);
+    CHECK_INT(shown.n_node, s.body->n_node);
+    for (int i = 0; i < s.body->n_dof; i++) pal_mul33(s.body->x + 3 * (size_t)i, f, s.body->x_rest + 3 * (size_t)i);
+    pal_frame *frame = pal_frame_create(s.world);
+    REQUIRE(frame && !pal_world_field(s.world, 0, PAL_FIELD_STRAIN, true, NULL));
+    REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_DISPLACEMENT_M, true, NULL) && !pal_frame_fit(frame, s.world));
+    pal_world_frame(s.world, frame);
+    const float *strain = frame->part[0].field[PAL_FIELD_STRAIN].node,
+                *moved = frame->part[0].field[PAL_FIELD_DISPLACEMENT_M].node;
+    REQUIRE(strain && moved);
+    const double wanted = pal_largest_strain(f);
+    for (int i = 0; i < shown.n_node; i++) {
+        double to[3];
+        pal_mul33(to, f, shown.node_rest_m + 3 * (size_t)i);
+        pal_sub3(to, to, shown.node_rest_m + 3 * (size_t)i);
+        for (int c = 0; c < 3; c++) CHECK_NEAR((double)strain[4 * i + c], to[c], 1e-8);
+        CHECK_NEAR((double)strain[4 * i + 3], wanted, 1e-6);
+        CHECK_NEAR((double)moved[4 * i + 3], pal_norm3(to), 1e-8);
+    }
+    pal_frame_destroy(frame);
+    tool_scene_close(&s);
+}
+
 /* an entry of the scene asks for a field */
 static bool slab_with(tool_scene *s, const char *field, double rate_hz)
 {
@@ -559,6 +590,7 @@ int main(void)
     RUN(a_value_that_is_no_number_shows_as_zero);
     RUN(values_are_taken_ten_times_a_second_without_heap_and_at_once_after_reset);
     RUN(frames_have_room_for_a_field_while_its_row_is_there);
+    RUN(nodes_inside_have_the_linear_displacement_and_its_strain);
     RUN(refuses_what_the_model_does_not_give_with_a_sentence);
     RUN(an_entry_of_the_scene_keeps_its_row);
     RUN(rows_of_other_bodies_stay_theirs);
