@@ -129,6 +129,20 @@ async function checkInside(page, name) {
     await drawn(page);
     await page.screenshot({ path: join(pictures, `inside_${name}_corner.png`) });
     for (const n of [0, 1, 2]) await setPlane(page, n, "none", 0.5);
+    const cloud = () =>
+        page.evaluate(() => {
+            const { inside, state } = window.palpate;
+            const [shown] = [...(inside.cloud?.clouds.values() ?? [])];
+            return { texture: shown?.texture !== undefined, surface: [...state.bodies.values()][0].mesh.visible };
+        });
+    await page.click("#inside-volume");
+    let shape = await until(cloud, (c) => c.texture && !c.surface);
+    check(`${name}: a cloud takes the place of the surface`, shape.texture && !shape.surface);
+    await drawn(page);
+    await page.screenshot({ path: join(pictures, `cloud_${name}.png`) });
+    await page.click("#inside-volume");
+    shape = await until(cloud, (c) => !c.texture && c.surface);
+    check(`${name}: without it the surface is back`, !shape.texture && shape.surface);
     now = await until(
         () => insideNow(page),
         (i) => i.caps === 0,

@@ -56,6 +56,7 @@ export class FieldDisplay {
         for (const body of this.state.bodies.values()) body.colours.drop();
         this.subscribe();
         this.showLegend();
+        this.inside?.showNote();
         this.stage.dirty = true;
     }
 

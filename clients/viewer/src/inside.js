@@ -1,6 +1,6 @@
 // What is inside the bodies: the panel of section planes, and the interiors that the server sends while a field is shown
 // in a section or a volume. What draws them is loaded when it is first used.
-import { buttonById, htmlById, makeOption } from "./dom.js";
+import { buttonById, htmlById, inputById, makeOption } from "./dom.js";
 import { DIRECTIONS, entryOf, noPlanes } from "./section_planes.js";
 import { outerFaces } from "./slice.js";
 import { text } from "./text.js";
@@ -26,6 +26,19 @@ export class Inside {
         this.interiors = new Map();
         /** @type {import("./section.js").Section | null} null: never used */
         this.section = null;
+        /** @type {import("./volume.js").Volume | null} null: never used */
+        this.cloud = null;
+        this.volume = false; // is the field drawn as a cloud?
+        this.threshold = Number(inputById("inside-threshold").value);
+        inputById("inside-volume").onchange = () => {
+            this.volume = inputById("inside-volume").checked;
+            inputById("inside-threshold").disabled = !this.volume;
+            this.changed();
+        };
+        inputById("inside-threshold").oninput = () => {
+            this.threshold = Number(inputById("inside-threshold").value);
+            this.stage.dirty = true;
+        };
         this.button = buttonById("inside-toggle");
         this.button.onclick = () => this.toggle();
         this.listPlanes();
@@ -75,7 +88,7 @@ export class Inside {
 
     /** are values inside looked at? */
     get wanted() {
-        return this.planes.some(({ direction }) => direction !== "none");
+        return this.volume || this.planes.some(({ direction }) => direction !== "none");
     }
 
     async changed() {
@@ -86,11 +99,30 @@ export class Inside {
             const { Section } = await import("./section.js");
             this.section ??= new Section(this.stage, this.state, this);
         }
+        if (this.volume && !this.cloud) {
+            const { Volume } = await import("./volume.js");
+            this.cloud ??= new Volume(this.stage, this.state, this);
+        }
+        this.showNote();
         this.stage.dirty = true;
+    }
+
+    /** what is missing for values inside */
+    showNote() {
+        const { field, parts } = this.state;
+        const missing = !this.wanted
+            ? ""
+            : !parts.some((part) => part.interior)
+              ? text("inside.surface")
+              : field === "none"
+                ? text("inside.choose")
+                : "";
+        htmlById("inside-note").textContent = missing;
     }
 
     /** before a picture */
     update() {
+        this.cloud?.update(this.section?.chosen() ?? []);
         this.section?.update();
     }
 

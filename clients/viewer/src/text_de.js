@@ -352,6 +352,10 @@ export const GERMAN = {
     "inside.direction.y": "Entlang y",
     "inside.direction.z": "Entlang z",
     "inside.direction.view": "Zu mir",
+    "inside.volume": "Farben als Wolke zeigen",
+    "inside.threshold": "Nur über",
+    "inside.choose": "Für Werte im Inneren eine Farbe wählen.",
+    "inside.surface": "Dieser Körper ist eine Fläche: Er hat keine Werte im Inneren.",
     "legend.wait": "Wartet auf Werte",
     "legend.rest": "Nirgends über {value} {unit}",
 };

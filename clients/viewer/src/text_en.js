@@ -351,6 +351,10 @@ export const ENGLISH = {
     "inside.direction.y": "Along y",
     "inside.direction.z": "Along z",
     "inside.direction.view": "Facing me",
+    "inside.volume": "Show the colours as a cloud",
+    "inside.threshold": "Only above",
+    "inside.choose": "Choose a colour to see values inside.",
+    "inside.surface": "This body is a surface: it has no values inside.",
     "legend.wait": "Waiting for values",
     "legend.rest": "Nowhere above {value} {unit}",
 };
