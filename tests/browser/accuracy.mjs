@@ -85,11 +85,11 @@ const colours = (page) =>
             });
         }
         return {
-            options: [...document.querySelector("#field").options].map((o) => o.value),
+            options: [...document.querySelectorAll("#field option:enabled")].map((o) => o.value),
             chosen: document.querySelector("#field").value,
             field: state.field,
             legend: !document.querySelector("#legend").hidden,
-            note: document.querySelector("#field-note").textContent,
+            note: document.querySelector("#field option:disabled")?.textContent ?? "",
             notices: window.notices,
             values: [...state.bodies.values()][0].colours.values !== null,
             component: state.running.includes("field_output"),

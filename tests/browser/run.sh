@@ -1,7 +1,7 @@
 #!/bin/sh
 # The browser tests: real Chromium on a real server. usage: run.sh pull|fields|calibrated|adaptive|sculpt|accuracy|rights|debrief|lobby|access|together BUILD [PICTURES]
 #   pull      two browsers share an organ that one of them pulls
-#   fields    displacement, stress, energy and edge stiffness in colours
+#   fields    displacement, stress, energy and stiffness in colours, inside the body too: sections and clouds
 #   calibrated  a calibrated scene and its error
 #   adaptive  an adaptive surface that is refined under the tool
 #   sculpt    a subdivision solid that is sculpted by clicks

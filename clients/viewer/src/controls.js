@@ -75,6 +75,7 @@ export class Controls {
 
     closePanels() {
         if (!htmlById("panel").hidden) this.togglePanel();
+        if (!htmlById("inside").hidden) this.page.inside.toggle();
         this.openAccuracy(false);
     }
 

@@ -11,6 +11,9 @@ import { text } from "./text.js";
  *   width as sliceTets takes them; x and value of the nodes as the server sent them last; revision: of these
  */
 
+/** @param {number} share */
+const percent = (share) => `${Math.round(100 * share)} %`;
+
 export class Inside {
     /**
      * @param {import("./app_state.js").AppState} state @param {import("./stage.js").Stage} stage
@@ -37,6 +40,7 @@ export class Inside {
         };
         inputById("inside-threshold").oninput = () => {
             this.threshold = Number(inputById("inside-threshold").value);
+            inputById("inside-threshold").ariaValueText = percent(this.threshold);
             this.stage.dirty = true;
         };
         this.button = buttonById("inside-toggle");
@@ -59,6 +63,7 @@ export class Inside {
                 direction.ariaLabel = text("inside.plane", number);
                 at.ariaLabel = text("inside.position", number);
                 at.value = "0.5";
+                at.ariaValueText = percent(plane.at);
                 flip.ariaLabel = flip.title = text("inside.flip");
                 at.disabled = flip.disabled = true;
                 direction.onchange = () => {
@@ -68,6 +73,7 @@ export class Inside {
                 };
                 at.oninput = () => {
                     plane.at = Number(at.value);
+                    at.ariaValueText = percent(plane.at);
                     this.changed();
                 };
                 flip.onclick = () => {

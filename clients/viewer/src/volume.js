@@ -70,7 +70,7 @@ void main() {
     float t = (value - mapRange.x) / (mapRange.y - mapRange.x);
     float peak = signed > 0.5 ? abs(2.0 * t - 1.0) : t;
     // per hundredth of the diagonal
-    float opacity = texel.g * (0.006 + 0.22 * smoothstep(threshold, min(threshold + 0.35, 1.0), peak));
+    float opacity = texel.g * 0.2 * smoothstep(threshold, min(threshold + 0.35, 1.0), peak);
     opacity = 1.0 - pow(1.0 - opacity, 100.0 / float(nStep));
     sum += (1.0 - seen) * opacity * mapColour(t);
     seen += (1.0 - seen) * opacity;
@@ -81,8 +81,29 @@ void main() {
 }`,
     });
 
+/** the outline of the body: the more opaque the more its surface is seen from the side */
+const makeHull = () =>
+    new THREE.ShaderMaterial({
+        transparent: true,
+        depthWrite: false,
+        uniforms: { ink: { value: new THREE.Color(0x8f9fae) } },
+        vertexShader: `varying float vFacing;
+void main() {
+  vec4 at = modelViewMatrix * vec4(position, 1.0);
+  gl_Position = projectionMatrix * at;
+  vFacing = abs(dot(normalize(normalMatrix * normal), normalize(at.xyz)));
+}`,
+        fragmentShader: `varying float vFacing;
+uniform vec3 ink;
+void main() {
+  gl_FragColor = vec4(ink, 0.06 + 0.5 * pow(1.0 - vFacing, 2.5));
+  #include <colorspace_fragment>
+}`,
+    });
+
 /**
- * @typedef {{mesh: THREE.Mesh<THREE.BoxGeometry, THREE.ShaderMaterial>, texture: THREE.Data3DTexture | null,
+ * @typedef {{hull: THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial>,
+ *   mesh: THREE.Mesh<THREE.BoxGeometry, THREE.ShaderMaterial>, texture: THREE.Data3DTexture | null,
  *   revision: number}} Cloud
  */
 
@@ -119,9 +140,11 @@ export class Volume {
         let cloud = this.clouds.get(part);
         if (!cloud) {
             const mesh = new THREE.Mesh(new THREE.BoxGeometry(1, 1, 1), cloudMaterial(body.colours.uniforms));
-            mesh.frustumCulled = false;
-            this.stage.scene.add(mesh);
-            this.clouds.set(part, (cloud = { mesh, texture: null, revision: -1 }));
+            const hull = new THREE.Mesh(body.geometry, makeHull());
+            mesh.frustumCulled = hull.frustumCulled = false;
+            hull.renderOrder = 1; // over the cloud
+            this.stage.scene.add(mesh, hull);
+            this.clouds.set(part, (cloud = { mesh, hull, texture: null, revision: -1 }));
         }
         const { uniforms } = cloud.mesh.material;
         uniforms.threshold.value = this.inside.threshold;
@@ -156,7 +179,8 @@ export class Volume {
     drop(part) {
         const cloud = this.clouds.get(part);
         if (!cloud) return;
-        this.stage.scene.remove(cloud.mesh);
+        this.stage.scene.remove(cloud.mesh, cloud.hull);
+        cloud.hull.material.dispose();
         cloud.texture?.dispose();
         cloud.mesh.geometry.dispose();
         cloud.mesh.material.dispose();

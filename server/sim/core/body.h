@@ -70,6 +70,9 @@ typedef struct pal_display {
     const int32_t *shown_node;  /* node of each shown vertex when skin is NULL                           [n_shown] */
     const int32_t *shown_face;  /* of solids: control face of each shown triangle, -1: inside a cut; NULL: another
                                    body                                                                    [n_tri] */
+    /* tetrahedra of nodes that fill a solid, for sections; NULL: those of the mesh do, or nothing [n_tet][4] */
+    const int32_t *tet;
+    int n_tet;
     /* while a change of method is blended in: the surface shown before less the present one, of which offset_part is
      * added to what is shown and to every point that tools touch; NULL: no blend */
     const float *offset_m;                         /* m, body frame                                   [n_shown][3] */

@@ -122,6 +122,9 @@ static pal_err make_body(const pal_config_entry *item, pal_build *build)
     pal_body *body = build->body;
     const pal_subdivision_solid *solid = body->model.solid;
     PAL_TRY(pal_body_allocate_interpolated(body, build->arena, &solid->rows));
+    int32_t *tet;
+    PAL_TRY(pal_subdivision_interior(solid, build->arena, &body->display.n_tet, &tet));
+    body->display.tet = tet;
     body->node_inverse_mass_1_kg = PAL_NEW(build->arena, double, body->n_node);
     body->mass_operator = PAL_NEW(build->arena, pal_mass_operator, 1);
     if (!body->node_inverse_mass_1_kg || !body->mass_operator) return PAL_ERR_MEMORY;

@@ -8,6 +8,7 @@
  * constant between edits. Thread: make, sample [load]; reading [sim]. */
 #ifndef PAL_SIM_SUBDIVISION_SUBDIVISION_SOLID_H
 #define PAL_SIM_SUBDIVISION_SUBDIVISION_SOLID_H
+#include "server/base/arena.h"
 #include "server/mesh/cells/cell_elements.h"
 #include "server/mesh/cells/maccracken_joy.h"
 #include "server/num/spline.h"
@@ -56,6 +57,11 @@ static inline const int32_t *pal_subdivision_solid_nodes(const pal_subdivision_s
 /* d(x, y, z)/d(u, v, w) of an element with nodes at x, row-major J[3 a + b] = dx_a/du_b, from gradients of
  * pal_cell_shape; returns its determinant */
 double pal_subdivision_solid_jacobian(const double *x, const int32_t *node, int n_node, double (*g)[3], double J[9]);
+/* Tetrahedra of nodes that fill the solid, for sections of what is shown: six for each hexahedron, around its diagonal
+ * 0 7, two for each pyramid. Those of neighbours may cut their common quad along different diagonals. Cubic elements
+ * are taken by the control points of their own corners, near which the material passes. From the arena; MEMORY. [load]
+ */
+pal_err pal_subdivision_interior(const pal_subdivision_solid *solid, pal_arena *arena, int *n_tet, int32_t **tet);
 /* volume at rest by quadrature, m^3 */
 double pal_subdivision_solid_volume_m3(const pal_subdivision_solid *solid);
 #endif

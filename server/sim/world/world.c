@@ -148,11 +148,10 @@ static pal_err make_part(pal_world *w, int b)
     }
     memcpy(tri, body->active ? body->dofs.slot : display->surface->tri, 3 * sizeof *tri * (size_t)p->n_tri);
     p->rest_m = rest_m, p->tri = tri;
-    if (body->tets) {
-        p->n_node = body->tets->n_node, p->n_tet = body->tets->n_tet;
-        p->node_rest_m = body->node_rest, p->tet = body->tets->tet;
-        pal_copy3(p->offset_m, body->offset_m);
-    }
+    p->node_rest_m = body->node_rest;
+    pal_copy3(p->offset_m, body->offset_m);
+    if (body->tets) p->n_node = body->tets->n_node, p->n_tet = body->tets->n_tet, p->tet = body->tets->tet;
+    if (display->tet) p->n_node = body->n_node, p->n_tet = display->n_tet, p->tet = display->tet;
     return body->active ? make_hierarchy(w, body->dofs.levels, p) : PAL_ERR_OK;
 }
 
