@@ -96,6 +96,10 @@ const insideNow = (page) =>
 
 /** sections of a body that is being pulled, with its displacement inside */
 async function checkInside(page, name) {
+    // the mouse pulls: buttons are pressed by the page, and a slow machine may not let go meanwhile
+    const press = (id) => page.evaluate((button) => document.querySelector(button).click(), id);
+    await press("#pause");
+    await until(() => page.evaluate(() => window.palpate.state.status.paused));
     await choose(page, "displacement");
     await page.keyboard.press("i");
     check(`${name}: key I opens the section planes`, await page.isVisible("#inside"));
@@ -135,12 +139,12 @@ async function checkInside(page, name) {
             const [shown] = [...(inside.cloud?.clouds.values() ?? [])];
             return { texture: shown?.texture !== undefined, surface: [...state.bodies.values()][0].mesh.visible };
         });
-    await page.click("#inside-volume");
+    await press("#inside-volume");
     let shape = await until(cloud, (c) => c.texture && !c.surface);
     check(`${name}: a cloud takes the place of the surface`, shape.texture && !shape.surface);
     await drawn(page);
     await page.screenshot({ path: join(pictures, `cloud_${name}.png`) });
-    await page.click("#inside-volume");
+    await press("#inside-volume");
     shape = await until(cloud, (c) => !c.texture && c.surface);
     check(`${name}: without it the surface is back`, !shape.texture && shape.surface);
     now = await until(
@@ -150,6 +154,8 @@ async function checkInside(page, name) {
     check(`${name}: without planes the body is whole again`, now.caps === 0 && now.clipped[0] === 0);
     await page.keyboard.press("i");
     check(`${name}: key I closes the section planes`, await page.isHidden("#inside"));
+    await press("#pause");
+    await until(() => page.evaluate(() => !window.palpate.state.status.paused));
 }
 
 /** pulls the organ and displays fields of its model; the pictures have its name */

@@ -70,7 +70,7 @@ void main() {
     float t = (value - mapRange.x) / (mapRange.y - mapRange.x);
     float peak = signed > 0.5 ? abs(2.0 * t - 1.0) : t;
     // per hundredth of the diagonal
-    float opacity = texel.g * 0.2 * smoothstep(threshold, min(threshold + 0.35, 1.0), peak);
+    float opacity = texel.g * 0.3 * smoothstep(threshold, min(threshold + 0.4, 1.0), peak);
     opacity = 1.0 - pow(1.0 - opacity, 100.0 / float(nStep));
     sum += (1.0 - seen) * opacity * mapColour(t);
     seen += (1.0 - seen) * opacity;
