@@ -25,7 +25,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { PATH = 1200, TETGEN_MAX = 1000000, LABELS = 256, FILES = 64, SENTENCE = 160 };
+enum { PATH = 1200, TETGEN_MAX = 1000000, LABELS = 256, FILES = 64, SENTENCE = 160, RESOLUTION_MAX = 1024 };
 
 static const char about[] =
     "Makes a scene from a surface (OBJ, STL, PLY, OFF) or a segmented scan (NIfTI .nii .nii.gz, INRIMAGE .inr\n"
@@ -55,10 +55,11 @@ typedef struct outcome {
     size_t world_byte;
     double limit_s;
     int n_substep,
-        fine_substep;    /* of a step at rest; with a face of the finest level, as each level halves the bound */
-    int max_node;        /* limit of the component refine; 0: none is needed                                  */
-    double busy;         /* predicted share of real time with as many nodes as the limit allows               */
-    char size[SENTENCE]; /* a question about the unit; "": the size is an organ's */
+        fine_substep;          /* of a step at rest; with a face of the finest level, as each level halves the bound */
+    int max_node;              /* limit of the component refine; 0: none is needed                                  */
+    double busy;               /* predicted share of real time with as many nodes as the limit allows               */
+    char size[SENTENCE];       /* a question about the unit; "": the size is an organ's */
+    char volume[2 * SENTENCE]; /* what the voxels do to a thin organ, and the remedy; "": they fit it */
     char slow[PAL_PREFLIGHT_LINE]; /* the body returns slowly; "": it does not, or its world takes long */
     char file[FILES][80];
     int n_file;
@@ -209,7 +210,8 @@ static cJSON *as_json(const pal_loaded_scene *loaded, const arguments *args, con
                            {"guessed", JSON_BOOL(r->unit_guessed)})},
         {"label", r->label >= 0 ? JSON_NUMBER(r->label) : NULL}, {"triangles", JSON_NUMBER(mesh->surface.n_tri)},
         {"vertices", JSON_NUMBER(mesh->surface.n_vertex)},
-        {"size_question", out->size[0] ? JSON_TEXT(out->size) : NULL});
+        {"size_question", out->size[0] ? JSON_TEXT(out->size) : NULL},
+        {"volume_remark", out->volume[0] ? JSON_TEXT(out->volume) : NULL});
     if (r->n_level > 0)
         add_levels(o, out);
     else
@@ -223,8 +225,8 @@ static cJSON *as_json(const pal_loaded_scene *loaded, const arguments *args, con
                               {"split", JSON_NUMBER(r->prepare.split_s)}, {"skin", JSON_NUMBER(r->prepare.skin_s)},
                               {"write", JSON_NUMBER(out->write_s)}, {"total", JSON_NUMBER(out->total_s)});
     return PAL_JSON_ADD(o, {"dropped", dropped}, {"mended", JSON_NUMBER(read->n_repaired)},
-                        {"welded", JSON_NUMBER(read->n_welded)}, {"slow", out->slow[0] ? JSON_TEXT(out->slow) : NULL},
-                        {"seconds", seconds});
+                        {"welded", JSON_NUMBER(read->n_welded)}, {"welded_apart_m", JSON_NUMBER(read->max_weld_m)},
+                        {"slow", out->slow[0] ? JSON_TEXT(out->slow) : NULL}, {"seconds", seconds});
 }
 
 /* in the unit that gives one to four digits before the decimal point; returns out */
@@ -306,10 +308,9 @@ static void print(const pal_loaded_scene *loaded, const arguments *args, const o
     if (dropped.text[0]) printf("%s\n", dropped.text);
     if (out->slow[0]) printf("%s\n", out->slow);
     if (out->size[0]) printf("%s\n", out->size);
-    if (r->n_level == 0 && fabs(r->prepare.volume_error) > PAL_VOLUME_MISSED)
-        printf("the voxels miss the volume of the surface by %.0f %%: a larger --resolution comes nearer, and --model "
-               "adaptive keeps the surface itself\n",
-               100 * fabs(r->prepare.volume_error));
+    if (out->volume[0]) printf("%s\n", out->volume);
+    if (d->max_weld_m > 0)
+        printf("welded %lld corners that were up to %.2g mm apart\n", (long long)d->n_welded, 1e3 * d->max_weld_m);
     if (d->n_degenerate + d->n_duplicate + d->n_nonfinite + d->n_folded > 0)
         printf("dropped triangles: %lld degenerate, %lld duplicate, %lld not finite, %lld folded\n",
                (long long)d->n_degenerate, (long long)d->n_duplicate, (long long)d->n_nonfinite,
@@ -379,6 +380,35 @@ static void question_size(const pal_loaded_scene *loaded, double unit_m, char te
         snprintf(text, SENTENCE, "the body is %.3g m long: is its unit right? (--units)", size_m);
 }
 
+/* A thin organ is missed by its voxels, or by their layer around it that model springs counts in full, while model fem
+ * weighs each voxel by its filled share. What shells that are open or lie in each other enclose is uncertain at any
+ * resolution. */
+static void judge_volume(const pal_surface_scene_report *r, const pal_surface_scene *options, char text[2 * SENTENCE])
+{
+    const double missed = 100 * fabs(r->prepare.volume_error), surface_m3 = r->prepare.voxel.surface_volume_m3;
+    const double whole = surface_m3 > 0 ? r->prepare.volume_m3 / surface_m3 : 0;
+    const int finer = (int)fmin(2 * r->resolution, RESOLUTION_MAX);
+    text[0] = 0;
+    if (r->n_level > 0) return;
+    if (missed > 100 * PAL_VOLUME_MISSED && r->prepare.voxel.open)
+        snprintf(
+            text, 2 * SENTENCE,
+            "the voxels miss the volume of the surface by %.0f %%, which is uncertain as the surface is open: close "
+            "its holes and join its shells, or --model adaptive keeps the surface itself",
+            missed);
+    else if (missed > 100 * PAL_VOLUME_MISSED)
+        snprintf(text, 2 * SENTENCE,
+                 "the voxels miss the volume of the surface by %.0f %%%s: --resolution %d comes nearer, and --model "
+                 "adaptive keeps the surface itself",
+                 missed, options->largest_only ? " with what --largest leaves out" : "", finer);
+    else if (!options->fem && whole > PAL_LAYER_OUTWEIGHS)
+        snprintf(
+            text, 2 * SENTENCE,
+            "with their border layer the voxels have %.1f times the volume of the surface, as parts of it are thin: "
+            "--model fem counts what lies inside, --resolution %d comes nearer, --model adaptive keeps the surface",
+            whole, finer);
+}
+
 static int run(pal_flag_common *common, const char *in, arguments *args)
 {
     pal_loaded_scene *loaded = NULL;
@@ -391,6 +421,7 @@ static int run(pal_flag_common *common, const char *in, arguments *args)
                       : pal_scene_from_surface(in, &args->scene, &loaded, &out.report, &diag);
     if (err) return pal_report_refusal(common, err, &diag);
     question_size(loaded, out.report.unit_m, out.size);
+    judge_volume(&out.report, &args->scene, out.volume);
     err = pal_scene_rename(loaded, args->name, args->title, args->source, &diag);
     if (!err && args->scene.adaptive) err = limit_nodes(loaded, in ? in : "procedural", &out, &diag);
     if (!err) err = pal_diagnostic_prefix(&diag, find_return(loaded, &out, &diag), in ? in : "procedural");
@@ -451,7 +482,7 @@ static const pal_flag flag[] = {
     {"--model", "springs|fem|adaptive", PAL_FLAG_WORD, &args.model, 0, 0,
      "mass-spring tetrahedra (paper B); finite elements, implicit; or a surface of springs that\n"
      "refines where it is touched (paper C) (springs)"},
-    {"--resolution", "N", PAL_FLAG_COUNT, &args.scene.resolution, 1, 1024,
+    {"--resolution", "N", PAL_FLAG_COUNT, &args.scene.resolution, 1, RESOLUTION_MAX,
      "voxels along the longest axis (the number that gives 13,000 tetrahedra, or 2,500 nodes for fem)"},
     {"--element", "hex8_bbar|hex8|tet4|tet10", PAL_FLAG_WORD, &args.scene.element, 0, 0, "fem: element (hex8_bbar)"},
     {"--law", "corotational|neo_hookean|linear", PAL_FLAG_WORD, &args.scene.law, 0, 0,

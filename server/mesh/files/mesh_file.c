@@ -9,6 +9,8 @@
 #include <string.h>
 /* no file is read beyond this */
 static const size_t max_byte = (size_t)4 << 30;
+/* of the diagonal: wider gaps between triangles are openings; a hundred times what is closed */
+static const double max_gap = 1e-3;
 
 typedef pal_err reader(pal_mesh_build *build);
 
@@ -37,6 +39,30 @@ static pal_err parse(pal_mesh_build *build)
     return PAL_ERR_OK;
 }
 
+/* Refuses triangles that are not connected although their corners nearly meet: more than a tenth of their sides are
+ * open, and welding from farther away closes most of these. */
+static pal_err check_connected(const pal_mesh_build *build, double weld, const pal_surface *s)
+{
+    pal_surface near = {0};
+    pal_surface_report report = {0};
+    pal_surface_topology open = {0}, closer = {0};
+    pal_err err = pal_surface_check(s, &open);
+    if (err || open.n_open_edge <= 0.1 * 3 * s->n_tri) return err;
+    err = pal_surface_copy(s, &near);
+    if (!err) err = pal_surface_clean(&near, max_gap, &report, NULL);
+    if (!err) err = pal_surface_check(&near, &closer);
+    pal_surface_free(&near);
+    if (err == PAL_ERR_MEMORY) return err;
+    if (err || 2 * closer.n_open_edge > open.n_open_edge) return PAL_ERR_OK;
+    double low[3], high[3];
+    pal_surface_box(s, low, high);
+    return PAL_MESH_REFUSE(
+        build, build->first_at,
+        "corners of neighbouring triangles miss each other by up to %.3g in the file's unit, and gaps "
+        "of at most %.3g are closed: join them in the program that wrote the file",
+        report.max_weld_m, weld * pal_dist3(low, high));
+}
+
 /* cleans and scales what was read */
 static pal_err finish(pal_mesh_build *build, const pal_mesh_file_options *options, pal_surface *s,
                       pal_surface_report *report, double *unit_m, const char **unit_name)
@@ -47,12 +73,18 @@ static pal_err finish(pal_mesh_build *build, const pal_mesh_file_options *option
         if (err == PAL_ERR_REFUSED) return PAL_MESH_REFUSE(build, build->first_at, "%s", reason.text);
         if (err) return pal_diagnostic_set(build->diag, err, "%s: %s", build->name, reason.text);
     }
+    if (options->weld > 0) {
+        pal_err err = check_connected(build, options->weld, s);
+        if (err == PAL_ERR_MEMORY) return pal_diagnostic_set(build->diag, err, "%s: no memory to weld", build->name);
+        if (err) return err;
+    }
     double low[3], high[3], unit = options->unit_m;
     const char *word = "given";
     pal_surface_box(s, low, high);
     if (!(unit > 0)) unit = pal_mesh_unit_guess(pal_dist3(low, high), &word);
     for (size_t i = 0; i < 3 * (size_t)s->n_vertex; i++) s->x[i] *= unit;
     pal_scale3(s->origin_m, unit, s->origin_m);
+    report->max_weld_m *= unit;
     if (unit_m) *unit_m = unit;
     if (unit_name) *unit_name = word;
     return PAL_ERR_OK;
