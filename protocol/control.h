@@ -120,6 +120,8 @@ typedef struct pal_wire_hello {
     uint32_t credit;                   /* unacknowledged cycles the server allows now                 */
     double box_min_m[3], box_max_m[3]; /* of the whole scene at rest                            */
     double up[3];                      /* unit, away from the ground                            */
+    char anatomical_axes[4];           /* where x, y and z point in the patient: "RAS"; "": not known, and not on the
+                                          wire */
     uint32_t n_part, n_tool;
     pal_wire_part_info part[PAL_WIRE_PART_MAX];
     pal_wire_tool_info tool[PAL_WIRE_TOOL_MAX];

@@ -44,6 +44,7 @@ static const pal_control_field HELLO_fields[] = {
     {"box_min_m", NUMBERS, true, ARRAY(hello, box_min_m), NULL},
     {"box_max_m", NUMBERS, true, ARRAY(hello, box_max_m), NULL},
     {"up", NUMBERS, true, ARRAY(hello, up), NULL},
+    {"anatomical_axes", TEXT_OR_EMPTY, false, ONE(hello, anatomical_axes)},
     {"parts", OBJECTS, true, LIST(hello, part, n_part), part_fields},
     {"tools", OBJECTS, true, LIST(hello, tool, n_tool), tool_fields},
     {"components", TEXTS, true, LIST(hello, plan.component, plan.n_component), NULL},

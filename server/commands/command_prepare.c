@@ -43,7 +43,7 @@ static const char about[] =
 
 typedef struct arguments {
     pal_surface_scene scene;
-    const char *folder, *units, *up, *name, *title, *source, *model;
+    const char *folder, *units, *up, *axes, *name, *title, *source, *model;
     double hold_percent, thickness_mm;
     bool procedural, list_labels, tetgen, no_tetgen;
 } arguments;
@@ -209,7 +209,7 @@ static cJSON *as_json(const pal_loaded_scene *loaded, const arguments *args, con
         {"units", PAL_JSON({"name", JSON_TEXT(args->units ? args->units : r->unit_name)}, {"m", JSON_NUMBER(r->unit_m)},
                            {"guessed", JSON_BOOL(r->unit_guessed)})},
         {"label", r->label >= 0 ? JSON_NUMBER(r->label) : NULL}, {"triangles", JSON_NUMBER(mesh->surface.n_tri)},
-        {"vertices", JSON_NUMBER(mesh->surface.n_vertex)},
+        {"vertices", JSON_NUMBER(mesh->surface.n_vertex)}, {"anatomical_axes", r->axes[0] ? JSON_TEXT(r->axes) : NULL},
         {"size_question", out->size[0] ? JSON_TEXT(out->size) : NULL},
         {"volume_remark", out->volume[0] ? JSON_TEXT(out->volume) : NULL});
     if (r->n_level > 0)
@@ -296,6 +296,7 @@ static void print(const pal_loaded_scene *loaded, const arguments *args, const o
         printf(", no unit fits the size in the file: scaled to an organ (--units overrides)");
     else if (r->unit_guessed)
         printf(", unit %s guessed from the size (--units overrides)", r->unit_name);
+    if (r->axes[0]) printf(", axes %s", r->axes);
     if (r->n_label > 1 && args->scene.label < 0)
         printf(", the most frequent of %d labels (--list-labels lists them)", r->n_label);
     printf("\n");
@@ -516,6 +517,10 @@ static const pal_flag flag[] = {
     {"--damping-ratio", "Z", PAL_FLAG_NUMBER, &args.scene.material.damping_ratio, 0, PAL_FACTOR_MAX,
      "damping of the slowest mode over the critical one, as long as the rate stays below 4 1/s (1)"},
     {"--up", "AXIS", PAL_FLAG_TEXT, &args.up, 0, 0, "x, y, z, -x, -y or -z: the direction against gravity (z)"},
+    {"--axes", "LETTERS", PAL_FLAG_TEXT, &args.axes, 0, 0,
+     "where x, y and z of the file point in the patient: R or L, A or P, S or I, as in RAS or LPS; the page\nshows "
+     "them "
+     "(those of a NIfTI scan, else not known)"},
     {"--hold", "PERCENT", PAL_FLAG_NUMBER, &args.hold_percent, 0.1, 100,
      "lowest part of the height that is fixed (5; an open adaptive surface: its open edges)"},
     {"--gravity", NULL, PAL_FLAG_SWITCH, &args.scene.gravity, 0, 0,
@@ -552,6 +557,9 @@ int command_prepare(int argc, char **argv)
     if (args.tetgen && args.no_tetgen) return pal_flags_wrong(&common, "--tetgen and --no-tetgen exclude each other");
     if (args.up && !read_axis(args.up, args.scene.up))
         return pal_flags_wrong(&common, "--up: is not x, y, z, -x, -y or -z");
+    const char *fault = args.axes ? pal_anatomical_axes_fault(args.axes) : NULL;
+    if (fault) return pal_flags_wrong(&common, "--axes: %.20s %s", args.axes, fault);
+    if (args.axes) snprintf(args.scene.axes, sizeof args.scene.axes, "%.3s", args.axes);
     pal_material *m = &args.scene.material;
     if (m->young_Pa == 0) m->young_Pa = args.scene.adaptive ? PAL_WALL_YOUNG_PA : PAL_SOLID_YOUNG_PA;
     args.scene.hold = args.hold_percent / 100;

@@ -491,6 +491,7 @@ void pal_stream_hello(const pal_stream *stream, pal_wire_hello *out)
         out->up[c] = scene->up[c];
         size += pow(stream->box_max_m[c] - stream->box_min_m[c], 2);
     }
+    pal_plain_text(out->anatomical_axes, sizeof out->anatomical_axes, scene->anatomical_axes);
     out->n_part = (uint32_t)stream->n_part;
     for (int p = 0; p < stream->n_part; p++) out->part[p] = stream->part[p].info;
     out->n_tool = (uint32_t)scene->n_tool;

@@ -36,8 +36,9 @@ typedef struct pal_surface_scene {
     pal_material material; /* young_Pa 0: the default material                 */
     bool largest_only;     /* keep only the largest of several components         */
     double up[3];          /* unit, away from the ground; 0 0 0: (0, 0, 1)            */
-    double hold;           /* lowest part of the height held in place; 0: 0.05, of cells
-                            * more where that is not an eighth of the control vertices     */
+    char axes[PAL_AXES_BYTES]; /* where x, y and z point in the patient, "LPS"; "": as the scan says, if it does */
+    double hold;               /* lowest part of the height held in place; 0: 0.05, of cells
+                                * more where that is not an eighth of the control vertices     */
     bool
         gravity; /* add the effect; a scanned shape is in equilibrium with its weight already, so the default is none */
     bool area_springs; /* add the component face_area; without it edges and volumes take its share */
@@ -63,8 +64,9 @@ typedef struct pal_surface_scene_report {
     bool unit_guessed;     /* not given: derived from the size */
     double read_s;
     int resolution;
-    int label;   /* of a label volume, -1: a surface                */
-    int n_label; /* labels it holds beside 0, at most 64 are counted */
+    int label;                 /* of a label volume, -1: a surface                */
+    char axes[PAL_AXES_BYTES]; /* given, or of the scan; "": not known */
+    int n_label;               /* labels it holds beside 0, at most 64 are counted */
     /* of model adaptive_springs, all its levels; n_level 0: another model */
     int n_level, n_node[PAL_LEVELS_MAX], n_spring[PAL_LEVELS_MAX];
     int n_piece, n_open_edge;           /* pieces without a common edge; 0 open edges: closed      */

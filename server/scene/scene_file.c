@@ -99,7 +99,9 @@ static pal_err read_support(const pal_json *at, pal_support_def *out)
     return pal_json_box(&box, "low_m", "high_m", out->low_m, out->high_m);
 }
 
-static pal_err read_mesh(const pal_json *at, const pal_config_entry *model, pal_prepared *out)
+/* axes: of the scene; "" becomes that of a scan that states it */
+static pal_err read_mesh(const pal_json *at, const pal_config_entry *model, char axes[PAL_AXES_BYTES],
+                         pal_prepared *out)
 {
     char units[16] = "", file[FOLDER + FOLDER / 2];
     bool has_mesh = pal_json_has(at, "mesh");
@@ -129,7 +131,10 @@ static pal_err read_mesh(const pal_json *at, const pal_config_entry *model, pal_
         PAL_TRY(pal_json_text(at, "units", false, units, sizeof units));
         options.unit_m = *units ? pal_mesh_unit_named(units) : 0;
         if (*units && options.unit_m == 0) return pal_json_refuse_key(at, "units", "is not m, cm, mm, um or in");
-        err = pal_scene_prepare_file(file, &options, out, NULL, &reason);
+        pal_surface_scene_report report = {0};
+        memcpy(options.axes, axes, PAL_AXES_BYTES);
+        err = pal_scene_prepare_file(file, &options, out, &report, &reason);
+        if (!err) memcpy(axes, report.axes, PAL_AXES_BYTES);
     }
     return pal_json_forward(at, key, err, &reason);
 }
@@ -172,7 +177,7 @@ static pal_err read_body(const pal_json *at, int index, pal_loaded_scene *scene)
     if (solid)
         PAL_TRY(pal_subdivision_read(at, scene, index));
     else
-        PAL_TRY(read_mesh(at, &body->model, &scene->mesh[index]));
+        PAL_TRY(read_mesh(at, &body->model, scene->scene.anatomical_axes, &scene->mesh[index]));
     scene->n_mesh = index + 1;
     PAL_TRY(pal_json_bool(at, "largest", &largest_only));
     pal_diagnostic reason = {""};
@@ -257,6 +262,16 @@ static pal_err read_target(const pal_json *root, pal_scene *scene)
     return scene->budget_ms > 0 ? PAL_ERR_OK : pal_json_refuse(&budget, "has no step_ms");
 }
 
+static pal_err read_axes(const pal_json *at, char axes[PAL_AXES_BYTES])
+{
+    char text[16] = "";
+    PAL_TRY(pal_json_text(at, "anatomical_axes", false, text, sizeof text));
+    const char *fault = pal_anatomical_axes_fault(text);
+    if (fault) return pal_json_refuse_key(at, "anatomical_axes", "%s %s", text, fault);
+    snprintf(axes, PAL_AXES_BYTES, "%.3s", text);
+    return PAL_ERR_OK;
+}
+
 static pal_err read_scene(const pal_json *at, pal_loaded_scene *loaded)
 {
     pal_scene *scene = &loaded->scene;
@@ -275,6 +290,7 @@ static pal_err read_scene(const pal_json *at, pal_loaded_scene *loaded)
     PAL_TRY(pal_json_bool(at, "keep_real_time", &scene->keep_real_time));
     PAL_TRY(pal_json_count(at, "max_substep", 1, 1000000, &scene->max_substep));
     PAL_TRY(pal_json_vector(at, "up", scene->up));
+    PAL_TRY(read_axes(at, scene->anatomical_axes));
     PAL_TRY(read_tools(at, scene));
     PAL_TRY(pal_json_list(at, "bodies", PAL_BODY_MAX, &list));
     if (!list.value || !list.value->child) return pal_json_refuse(&list, "a scene needs at least one body");

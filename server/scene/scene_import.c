@@ -162,8 +162,11 @@ static pal_err read_volume(const char *path, const pal_surface_scene *options, p
     report_progress(options, "label", 0);
     int n = pal_label_volume_list(&volume, count, LABELS);
     snprintf(report->surface.place, sizeof report->surface.place, "byte %lld", (long long)volume.first_byte);
-    pal_err err =
-        n > 0 ? PAL_ERR_OK : PAL_REFUSE(diag, "%s: %s: the volume holds no label but 0", path, report->surface.place);
+    const bool other = volume.axes[0] && options->axes[0] && strcmp(volume.axes, options->axes) != 0;
+    if (!options->axes[0]) snprintf(report->axes, sizeof report->axes, "%s", volume.axes);
+    pal_err err = other ? PAL_REFUSE(diag, "%s: the axes of the scan are %s, not %s", path, volume.axes, options->axes)
+                  : n > 0 ? PAL_ERR_OK
+                          : PAL_REFUSE(diag, "%s: %s: the volume holds no label but 0", path, report->surface.place);
     if (!err) {
         int wanted = options->adaptive ? PAL_COARSE_TRI : PAL_WANTED_TRI;
         pal_label_surface_options surface = {
@@ -188,6 +191,7 @@ static pal_err read_any(const char *path, const pal_surface_scene *options, pal_
     struct stat facts;
     report_progress(options, "read", 0);
     report->label = -1;
+    snprintf(report->axes, sizeof report->axes, "%s", options->axes);
     /* a pipe or device would be waited for */
     if (stat(path, &facts)) return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s", path, strerror(errno));
     if (!S_ISREG(facts.st_mode)) return PAL_REFUSE(diag, "%s: not a file", path);
@@ -328,6 +332,7 @@ static pal_err make_body(pal_loaded_scene *loaded, const char *name, const pal_s
     if (options->material.young_Pa > 0) body->material = options->material;
     scene->n_body = 1;
     if (pal_norm3(options->up) > 0) pal_copy3(scene->up, options->up);
+    snprintf(scene->anatomical_axes, sizeof scene->anatomical_axes, "%s", report ? report->axes : options->axes);
     if (options->hold > 0)
         body->support[0].fraction = options->hold;
     else if (cells)
@@ -508,6 +513,7 @@ pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene 
     report->read_s = pal_clock_s() - start;
     report->unit_m = 1;
     report->unit_name = "m";
+    snprintf(report->axes, sizeof report->axes, "%s", options->axes);
     snprintf(report->surface.format, sizeof report->surface.format, "procedural");
     report->surface.n_vertex_read = shape.surface.n_vertex;
     report->surface.n_tri_read = shape.surface.n_tri;

@@ -125,6 +125,7 @@ static char *scene_text(const pal_scene *scene)
     cJSON *root = PAL_JSON({"name", JSON_TEXT(scene->name)}, {"title", JSON_TEXT(scene->title)},
                            {"source", JSON_TEXT(scene->source)}, {"accuracy", accuracy}, {"budget", budget},
                            {"step_s", pal_json_exact(scene->step_s)}, {"up", pal_json_exact_list(scene->up, 3)},
+                           {"anatomical_axes", scene->anatomical_axes[0] ? JSON_TEXT(scene->anatomical_axes) : NULL},
                            {"gravity_m_s2", gravity_acts(scene) ? pal_json_exact(scene->gravity_m_s2) : NULL},
                            {"max_substep", pal_json_exact(scene->max_substep)}, {"bodies", bodies}, {"tools", tools});
     if (scene->keep_real_time) cJSON_AddTrueToObject(root, "keep_real_time");

@@ -65,6 +65,16 @@ await run(async () => {
         holders.join(" "),
     );
 
+    const cube = ada.locator("#orientation");
+    const seen = await cube.getAttribute("aria-label");
+    check("the cube of the patient's directions says from where the organ is seen", /seen from the/.test(seen), seen);
+    const turned = () => cube.locator("> div").evaluate((element) => element.style.transform);
+    const turnedBefore = await turned();
+    await ada.evaluate(() => window.palpate.stage.orbit(200, 0));
+    await until(turned, (now) => now !== turnedBefore);
+    check("and turns with the view", (await turned()) !== turnedBefore);
+    await ada.evaluate(() => window.palpate.stage.home());
+
     // the organ settles under its weight
     const before = await settled(ben, () => 0.0005, 1.5);
     check("the organ comes to rest", before < 0.03, `${(1000 * before).toFixed(2)} mm`);

@@ -167,6 +167,19 @@ run prepare soup.obj -o soup2 --no-tetgen --units mm
 refused 1 "soup.obj: line 5: corners of neighbouring triangles miss each other by up to 0.0[0-9]* in the file's unit, and gaps of at most 0.00[0-9]* are closed"
 end
 
+begin "prepare keeps where the axes point in the patient, and refuses what cannot be"
+run prepare box.obj -o axes --no-tetgen --units mm --axes LSA
+check "exit code $code" code_is 0
+check "the axes are not told" has out "100 x 80 x 60 mm, axes LSA"
+check "the scene does not have them" has axes/scene.json '"anatomical_axes":.*"LSA"'
+run prepare box.obj -o axes --no-tetgen --units mm
+check "axes are known that nobody gave" test "$(grep -c anatomical_axes axes/scene.json)" -eq 0
+run prepare box.obj -o axes2 --axes LAS
+refused 2 "axes: LAS is left-handed, so the body would be shown as its mirror image"
+run prepare box.obj -o axes2 --axes LLS
+refused 2 "axes: LLS is not three letters, one of R and L"
+end
+
 begin "--quiet prints nothing"
 run prepare box.obj -o scene3 --quiet
 check "exit code $code" code_is 0

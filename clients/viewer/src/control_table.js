@@ -41,6 +41,7 @@ export const SERVER_MESSAGES = Object.freeze(
             box_min_m: "vector",
             box_max_m: "vector",
             up: "vector",
+            "anatomical_axes?": "text",
             parts: [part],
             tools: [
                 {

@@ -12,6 +12,7 @@ import { forceText } from "./force_text.js";
 import { Layout } from "./layout.js";
 import { MembersPanel } from "./members_panel.js";
 import { Messages } from "./messages.js";
+import { OrientationCube } from "./orientation.js";
 import { OtherTools } from "./other_tools.js";
 import { pressDepth, withOwnTool } from "./own_tool.js";
 import { PlanPanel } from "./plan_panel.js";
@@ -53,6 +54,7 @@ const panel = new PlanPanel(document, sendCommand);
 const members = new MembersPanel(document, sendCommand, () => performance.now());
 const playback = new PlaybackBar(document, sendCommand);
 const others = new OtherTools();
+const orientation = new OrientationCube(document.body);
 const accuracy = new AccuracyPanel(document, sendCommand);
 const sculpt = new SculptPanel(document, sendCommand, save);
 const input = new ToolInput(
@@ -133,6 +135,7 @@ function draw() {
             marks.placeLabels();
             showForce();
             showScale(htmlById("scale"), stage.pixelsPerMetre());
+            orientation.show(state.hello?.anatomical_axes ?? "", stage.camera.matrixWorldInverse.elements);
         }
     }
     if (now - countedAt > 1000) {

@@ -331,4 +331,12 @@ export const GERMAN = {
     "view.label":
         "Das Organ. Ziehen Sie daran, oder daneben, um sich umzusehen. Mit der Tastatur: Eingabe setzt das Instrument auf das Organ, Pfeiltasten bewegen es, Bild auf und Bild ab heben und senken es, Escape lässt los.",
     "wait.server": "Warte auf den Server",
+    "orientation.tip": "Richtungen des Patienten: R rechts, L links, A vorn, P hinten, S zum Kopf, I zu den Füßen",
+    "orientation.label": "Ausrichtung: gesehen von {side}",
+    "orientation.R": "rechts",
+    "orientation.L": "links",
+    "orientation.A": "vorn",
+    "orientation.P": "hinten",
+    "orientation.S": "oben (Kopf)",
+    "orientation.I": "unten (Füße)",
 };

@@ -330,4 +330,13 @@ export const ENGLISH = {
     "view.label":
         "The organ. Drag it to pull, drag beside it to look around. By keyboard: Enter puts the tool on the organ, the arrow keys move it, Page Up and Page Down lift and lower it, Escape lets go.",
     "wait.server": "Waiting for the server",
+    "orientation.tip":
+        "Directions of the patient: R right, L left, A front, P back, S towards the head, I towards the feet",
+    "orientation.label": "Orientation: seen from {side}",
+    "orientation.R": "the right",
+    "orientation.L": "the left",
+    "orientation.A": "the front",
+    "orientation.P": "the back",
+    "orientation.S": "the head",
+    "orientation.I": "the feet",
 };

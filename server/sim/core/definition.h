@@ -5,6 +5,7 @@
 #define PAL_SIM_CORE_DEFINITION_H
 #include "server/mesh/cells/maccracken_joy.h"
 #include "server/mesh/volume/prepared.h"
+#include "server/sim/core/anatomical_axes.h"
 #include "server/sim/core/config_entry.h"
 #include "server/sim/core/tools.h"
 #include "server/sim/core/tuning.h"
@@ -123,9 +124,10 @@ typedef struct pal_scene {
      * the most accurate with a step of at most budget_ms, or the cheapest that meets both; 0: none. The world reads
      * neither */
     double max_error_m, budget_ms;
-    double step_s;       /* one step of the world; sub-steps are the solver's own: 1/60 */
-    double up[3];        /* unit, against gravity: (0, 0, 1)                          */
-    double gravity_m_s2; /* 9.81; acts on bodies with the effect `gravity`            */
+    double step_s;                        /* one step of the world; sub-steps are the solver's own: 1/60 */
+    double up[3];                         /* unit, against gravity: (0, 0, 1)                          */
+    char anatomical_axes[PAL_AXES_BYTES]; /* where x, y and z point in the patient, "RAS"; "": not known */
+    double gravity_m_s2;                  /* 9.81; acts on bodies with the effect `gravity`            */
     bool keep_real_time; /* a server gives up accuracy before time (server/net/hub_watch.h); no effect elsewhere */
     int max_substep;     /* budget of sub-steps per step, refused beyond: 2000        */
     int n_body;
