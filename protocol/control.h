@@ -73,6 +73,8 @@ typedef struct pal_wire_part_info {
     uint32_t epoch;
     uint32_t n_vertex, n_triangle;
     char asset[PAL_WIRE_NAME_BYTES]; /* path on the same server: "/asset/<hash>"   */
+    char image[PAL_WIRE_NAME_BYTES]; /* the same, of the image on its surface (PNG, JPEG), whose asset has uv; "": none,
+                                        and not on the wire */
     double error_m;                  /* bound per axis of its frames in normal use */
     uint32_t n_field;                /* fields for `subscribe_field`; 0 also from servers without fields */
     char field[PAL_WIRE_FIELDS_MAX][PAL_WIRE_FIELD_BYTES]; /* "displacement", "von_mises" ...           */

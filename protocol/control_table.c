@@ -14,6 +14,7 @@ static const pal_control_field part_fields[] = {{"name", TEXT, true, ONE(part_in
                                                 {"n_vertex", U32, true, ONE(part_info, n_vertex)},
                                                 {"n_triangle", U32, true, ONE(part_info, n_triangle)},
                                                 {"asset", TEXT, true, ONE(part_info, asset)},
+                                                {"image", TEXT_OR_EMPTY, false, ONE(part_info, image)},
                                                 {"error_m", F64, true, ONE(part_info, error_m)},
                                                 {"fields", TEXTS, false, LIST(part_info, field, n_field), NULL},
                                                 {"adaptive", BOOL, false, ONE(part_info, is_adaptive)},

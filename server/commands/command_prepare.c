@@ -210,6 +210,7 @@ static cJSON *as_json(const pal_loaded_scene *loaded, const arguments *args, con
                            {"guessed", JSON_BOOL(r->unit_guessed)})},
         {"label", r->label >= 0 ? JSON_NUMBER(r->label) : NULL}, {"triangles", JSON_NUMBER(mesh->surface.n_tri)},
         {"vertices", JSON_NUMBER(mesh->surface.n_vertex)}, {"anatomical_axes", r->axes[0] ? JSON_TEXT(r->axes) : NULL},
+        {"image", r->image[0] ? JSON_TEXT(r->image) : NULL},
         {"size_question", out->size[0] ? JSON_TEXT(out->size) : NULL},
         {"volume_remark", out->volume[0] ? JSON_TEXT(out->volume) : NULL});
     if (r->n_level > 0)
@@ -307,6 +308,7 @@ static void print(const pal_loaded_scene *loaded, const arguments *args, const o
     if (n_component > 1) printf("the components are not connected, each has its own support (--largest keeps one)\n");
     pal_loose_components_describe(&loaded->loose[0], loaded->scene.body[0].name, &dropped);
     if (dropped.text[0]) printf("%s\n", dropped.text);
+    if (r->image[0]) printf("%s\n", r->image);
     if (out->slow[0]) printf("%s\n", out->slow);
     if (out->size[0]) printf("%s\n", out->size);
     if (out->volume[0]) printf("%s\n", out->volume);
@@ -500,6 +502,8 @@ static const pal_flag flag[] = {
      "springs: preserve face areas too (edges and volumes alone have the same moduli at half the cost)"},
     {"--label", "N", PAL_FLAG_COUNT, &args.scene.label, 1, INT32_MAX, "label of a segmented scan (the most frequent)"},
     {"--list-labels", NULL, PAL_FLAG_SWITCH, &args.list_labels, 0, 0, "only list the labels of a segmented scan"},
+    {"--no-image", NULL, PAL_FLAG_SWITCH, &args.scene.no_image, 0, 0,
+     "leave the image of an OBJ file out (map_Kd of its first material: a PNG or JPEG beside the file)"},
     {"--units", "UNIT", PAL_FLAG_TEXT, &args.units, 0, 0,
      "unit of a surface file: m, cm, mm, um or in (guessed from the size)"},
     {"--triangles", "N", PAL_FLAG_COUNT, &args.scene.target_tri, 100, 10000000,

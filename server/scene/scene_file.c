@@ -4,6 +4,7 @@
 
 #include "server/base/heap.h"
 #include "server/mesh/files/mesh_file.h"
+#include "server/mesh/volume/image_seams.h"
 #include "server/scene/json_reader.h"
 #include "server/scene/region_file.h"
 #include "server/scene/scene_import.h"
@@ -132,11 +133,26 @@ static pal_err read_mesh(const pal_json *at, const pal_config_entry *model, char
         options.unit_m = *units ? pal_mesh_unit_named(units) : 0;
         if (*units && options.unit_m == 0) return pal_json_refuse_key(at, "units", "is not m, cm, mm, um or in");
         pal_surface_scene_report report = {0};
+        pal_image_map map = {0};
         memcpy(options.axes, axes, PAL_AXES_BYTES);
+        if (pal_json_has(at, "image")) options.image = &map;
         err = pal_scene_prepare_file(file, &options, out, &report, &reason);
+        if (!err && map.n_tri) err = pal_image_seams_make(&map, out, &reason);
+        pal_image_map_free(&map);
         if (!err) memcpy(axes, report.axes, PAL_AXES_BYTES);
     }
     return pal_json_forward(at, key, err, &reason);
+}
+
+static pal_err read_image(const pal_json *at, const pal_prepared *mesh, pal_image *out)
+{
+    char file[FOLDER + FOLDER / 2];
+    pal_diagnostic reason = {""};
+    if (!pal_json_has(at, "image")) return PAL_ERR_OK;
+    PAL_TRY(pal_json_file_name(at, "image", file, sizeof file));
+    if (!mesh->surface.uv)
+        return pal_json_refuse_key(at, "image", "the surface has no image coordinates, as vt of an OBJ file");
+    return pal_json_forward(at, "image", pal_image_read(file, out, &reason), &reason);
 }
 
 static pal_err read_lists(const pal_json *at, pal_body_def *body)
@@ -178,6 +194,8 @@ static pal_err read_body(const pal_json *at, int index, pal_loaded_scene *scene)
         PAL_TRY(pal_subdivision_read(at, scene, index));
     else
         PAL_TRY(read_mesh(at, &body->model, scene->scene.anatomical_axes, &scene->mesh[index]));
+    PAL_TRY(read_image(at, &scene->mesh[index], &scene->image[index]));
+    if (scene->image[index].bytes) body->image = &scene->image[index];
     scene->n_mesh = index + 1;
     PAL_TRY(pal_json_bool(at, "largest", &largest_only));
     pal_diagnostic reason = {""};
@@ -336,6 +354,7 @@ void pal_scene_free(pal_loaded_scene *loaded)
         for (int r = 0; r < PAL_REGION_MAX; r++) PAL_FREE(loaded->region[k][r].label, loaded->region[k][r].grid);
         PAL_FREE(loaded->spring_grid[k], loaded->stroke[k]);
         pal_cells_free(&loaded->cells[k]);
+        pal_image_free(&loaded->image[k]);
         pal_prepared_free(&loaded->mesh[k]);
     }
     free(loaded);

@@ -205,7 +205,7 @@ static pal_err read_any(const char *path, const pal_surface_scene *options, pal_
     } else if (options->label > 0) {
         err = PAL_REFUSE(diag, "%s: label %d is wanted, but this is not a label volume", path, options->label);
     } else {
-        pal_mesh_file_options file = {.unit_m = options->unit_m, .weld = PAL_MESH_WELD};
+        pal_mesh_file_options file = {.unit_m = options->unit_m, .weld = PAL_MESH_WELD, .image = options->image};
         report->unit_guessed = options->unit_m == 0;
         err = pal_mesh_file_read(path, &file, out, &report->surface, &report->unit_m, &report->unit_name, diag);
     }
@@ -329,6 +329,7 @@ static pal_err make_body(pal_loaded_scene *loaded, const char *name, const pal_s
     /* a body at rest costs nothing until it is touched */
     pal_entry_init(&body->effect[body->n_effect++], "", "sleep");
     for (int k = 0; k < body->n_effect; k++) snprintf(body->effect[k].path, PAL_ENTRY_TEXT, "bodies[0].effects[%d]", k);
+    if (loaded->image[0].bytes) body->image = &loaded->image[0];
     if (options->material.young_Pa > 0) body->material = options->material;
     scene->n_body = 1;
     if (pal_norm3(options->up) > 0) pal_copy3(scene->up, options->up);
@@ -450,7 +451,12 @@ pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *option
     if (!loaded) return PAL_ERR_MEMORY;
     char stem[256];
     pal_scene_stem(path, stem, sizeof stem);
-    pal_err err = pal_scene_prepare_file(path, options, &loaded->mesh[0], report, diag);
+    pal_image_map map = {0};
+    pal_surface_scene all = *options;
+    if (!options->no_image) all.image = &map;
+    pal_err err = pal_scene_prepare_file(path, &all, &loaded->mesh[0], report, diag);
+    if (!err && map.n_tri) err = pal_scene_take_image(path, &map, loaded, report, diag);
+    pal_image_map_free(&map);
     pal_diagnostic reason = {""};
     report_progress(options, "levels", 0);
     if (!err && options->adaptive) err = pal_scene_adaptive_inspect(&loaded->mesh[0].surface, options, report, &reason);

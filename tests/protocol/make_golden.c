@@ -225,7 +225,7 @@ static void make_asset_and_frames(void)
     size_t n_byte = 0;
     char hash[PAL_ASSET_HASH_CHARS];
     need(!pal_frame_order_create(s.rest_m, s.n_vertex, s.triangle, s.n_triangle, &order), "order");
-    need(!pal_asset_encode(s.rest_m, order, s.triangle, s.n_triangle, &bytes, &n_byte), "asset");
+    need(!pal_asset_encode(s.rest_m, NULL, order, s.triangle, s.n_triangle, &bytes, &n_byte), "asset");
     save("asset.bin", bytes, n_byte);
     pal_asset_hash(bytes, n_byte, hash);
     fprintf(expected, "\"asset\":{\"hash\":\"%s\",\"levels\":%u,\n", hash, order->n_level);

@@ -15,7 +15,7 @@ static bool pack(packed *p, int fineness)
 {
     *p = (packed){.s = shape_create(fineness)};
     return !pal_frame_order_create(p->s.rest_m, p->s.n_vertex, p->s.triangle, p->s.n_triangle, &p->order) &&
-           !pal_asset_encode(p->s.rest_m, p->order, p->s.triangle, p->s.n_triangle, &p->bytes, &p->n_byte);
+           !pal_asset_encode(p->s.rest_m, NULL, p->order, p->s.triangle, p->s.n_triangle, &p->bytes, &p->n_byte);
 }
 
 static void unpack(packed *p)

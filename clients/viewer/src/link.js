@@ -5,6 +5,7 @@ import { CommandQueue } from "./command_queue.js";
 import { readControl } from "./control_reader.js";
 import { decodeField, readFieldHead } from "./field_decoder.js";
 import { FrameDecoder, readFrameHead } from "./frame_decoder.js";
+import { findCopies, joinNormals, joinPositions } from "./image_seams.js";
 import { vertexNormals } from "./normals.js";
 import { text as textOf } from "./text.js";
 import { applyTopologyDelta, readTopologyDeltaHead, shownOf } from "./topology_delta.js";
@@ -20,6 +21,7 @@ const SILENT_MS = 1100; // the server sends its status three times a second: lon
 const LISTEN_MS = 200; // between two looks at that: it is told within 1.5 s
 const FIGURES_MS = 500;
 const LATENCY_MAX_MS = 10000; // a larger value comes from the clock of another connection
+const NONE = new Uint32Array(); // no vertex is doubled
 const SPARE_MAX = 4; // pairs of arrays that wait for reuse
 const CLOSE_FULL = 4003; // for now: tried again
 const CLOSE_NO_SESSION = 4004; // or it has ended
@@ -49,7 +51,7 @@ const FINAL = new Map([
  * Messages from the worker to the page.
  * @typedef {{type: "state", state: ConnectionState, text: string}
  *   | {type: "control", message: ServerMessage}
- *   | ({type: "part", part: number, epoch: number, rest: Float32Array} & Shown)
+ *   | ({type: "part", part: number, epoch: number, rest: Float32Array, uv: Float32Array<ArrayBuffer> | null} & Shown)
  *   | ({type: "frame", part: number, shown: Shown | null} & FrameArrays)
  *   | {type: "field", part: number, name: string, low: number, high: number, level: Uint8Array}
  *   | {type: "tools", tools: import("./wire.js").Tool[]}
@@ -74,7 +76,7 @@ const FINAL = new Map([
  *   later: (call: () => void, ms: number) => void,
  * }} Environment
  * @typedef {{decoder: FrameDecoder, table: Uint32Array, shown: Shown, changed: boolean, epoch: number, n: number,
- *   spare: FrameArrays[]}} Part table: of triangles, up to date; shown: of the table at the last frame; changed: the
+ *   spare: FrameArrays[], copies: Uint32Array}} Part copies: of image_seams.js; table: of triangles, up to date; shown: of the table at the last frame; changed: the
  *   table has changed since
  */
 
@@ -333,8 +335,10 @@ export class Link {
                 epoch: info.epoch,
                 n,
                 spare: [],
+                copies: asset.uv ? findCopies(asset.rest) : NONE,
             });
-            this.env.post({ type: "part", part: index, epoch: info.epoch, rest: asset.rest.slice(), ...shown });
+            const { rest, uv } = asset;
+            this.env.post({ type: "part", part: index, epoch: info.epoch, rest: rest.slice(), uv, ...shown });
             this.decodeEarly(index);
         } catch (error) {
             if (generation === this.generation && this.requested.get(index) === info.epoch)
@@ -408,11 +412,13 @@ export class Link {
             normals: new Float32Array(3 * part.n),
         };
         part.decoder.decode(bytes, positions);
+        joinPositions(part.copies, positions);
         const ms = this.env.now() - begin;
         const shown = part.changed ? shownOf(part.table, part.n) : null;
         if (shown) part.shown = shown;
         part.changed = false;
         vertexNormals(positions, part.shown.triangles, normals, part.shown.visible);
+        joinNormals(part.copies, normals);
         this.decodeUs += Math.round(1000 * ms);
         this.decodeSum += ms;
         this.nDecoded++;

@@ -1,6 +1,7 @@
 /* Surfaces from files: which reader, the checks that all formats share, cleaning and units. */
 #include "server/mesh/files/mesh_file.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/mesh_build.h"
@@ -36,6 +37,35 @@ static pal_err parse(pal_mesh_build *build)
         return PAL_MESH_REFUSE(build, build->max_index_at,
                                "a face uses vertex index %lld (from 0) of only %zu vertices",
                                (long long)build->max_index, build->n_vertex);
+    return PAL_ERR_OK;
+}
+
+/* the triangles that have image coordinates at all corners, as they stand in the file */
+static pal_err take_image(const pal_mesh_build *build, pal_image_map *out)
+{
+    pal_err err = PAL_ERR_OK;
+    PAL_ARRAY(&err, out->x, 9 * build->n_tri);
+    PAL_ARRAY(&err, out->uv, 6 * build->n_tri);
+    if (err) return pal_diagnostic_set(build->diag, err, "%s: no memory for image coordinates", build->name);
+    for (size_t t = 0; t < build->n_tri; t++) {
+        const int32_t *vt = build->tri_vt + 3 * t;
+        bool whole = true; /* and no corner is NaN or infinite, which cleaning drops */
+        for (int k = 0; k < 3; k++) {
+            const double *x = build->x + 3 * (size_t)build->tri[3 * t + (size_t)k];
+            whole = whole && vt[k] >= 0 && (size_t)vt[k] < build->n_vt;
+            for (int a = 0; a < 3; a++) whole = whole && fabs(x[a]) < 1e30;
+        }
+        if (!whole) continue;
+        for (int k = 0; k < 3; k++) {
+            memcpy(out->x + 9 * (size_t)out->n_tri + 3 * k, build->x + 3 * (size_t)build->tri[3 * t + (size_t)k],
+                   3 * sizeof *out->x);
+            for (int c = 0; c < 2; c++)
+                out->uv[6 * (size_t)out->n_tri + (size_t)(2 * k + c)] = (float)build->vt[2 * (size_t)vt[k] + (size_t)c];
+        }
+        out->n_tri++;
+    }
+    memcpy(out->library, build->library, sizeof out->library);
+    memcpy(out->material, build->material, sizeof out->material);
     return PAL_ERR_OK;
 }
 
@@ -85,7 +115,7 @@ static pal_err finish(pal_mesh_build *build, const pal_mesh_file_options *option
     for (size_t i = 0; i < 3 * (size_t)s->n_vertex; i++) s->x[i] *= unit;
     pal_scale3(s->origin_m, unit, s->origin_m);
     report->max_weld_m *= unit;
-    if (unit_m) *unit_m = unit;
+    *unit_m = unit;
     if (unit_name) *unit_name = word;
     return PAL_ERR_OK;
 }
@@ -94,23 +124,37 @@ pal_err pal_mesh_file_parse(const char *name, const uint8_t *bytes, size_t n_byt
                             pal_surface *out, pal_surface_report *report, double *unit_m, const char **unit_name,
                             pal_diagnostic *diag)
 {
-    static const pal_mesh_file_options plain = {0, PAL_MESH_WELD};
+    static const pal_mesh_file_options plain = {.weld = PAL_MESH_WELD};
     char shown[128];
     pal_file_printable_name(shown, name);
-    pal_mesh_build build = {
-        .name = shown, .bytes = bytes, .n_byte = n_byte, .diag = diag, .binary = true, .max_index = -1};
+    if (!options) options = &plain;
+    pal_mesh_build build = {.name = shown,
+                            .bytes = bytes,
+                            .n_byte = n_byte,
+                            .diag = diag,
+                            .binary = true,
+                            .takes_image = options->image != NULL,
+                            .max_index = -1};
+    pal_image_map image = {0};
     pal_err err = parse(&build);
+    if (!err && build.n_vt > 0 && build.tri_vt) err = take_image(&build, &image);
     pal_surface s = {.n_vertex = (int)build.n_vertex, .n_tri = (int)build.n_tri, .x = build.x, .tri = build.tri};
     pal_surface_report found = {.n_vertex_read = (int64_t)build.n_vertex, .n_tri_read = (int64_t)build.n_tri};
     if (!err) {
         snprintf(found.format, sizeof found.format, "%s", build.format);
         snprintf(found.place, sizeof found.place, "%s %lld", build.binary ? "byte" : "line", (long long)build.first_at);
-        err = finish(&build, options ? options : &plain, &s, &found, unit_m, unit_name);
+        double unit = 1;
+        err = finish(&build, options, &s, &found, &unit, unit_name);
+        if (unit_m) *unit_m = unit;
+        for (size_t k = 0; k < 9 * (size_t)image.n_tri; k++) image.x[k] = image.x[k] * unit - s.origin_m[k % 3];
     }
+    PAL_FREE(build.vt, build.tri_vt);
     if (err) {
         pal_surface_free(&s);
+        pal_image_map_free(&image);
         return err;
     }
+    if (options->image) *options->image = image;
     *out = s;
     if (report) *report = found;
     return PAL_ERR_OK;

@@ -3,7 +3,7 @@
  * file's size. Thread: [load]. */
 #ifndef PAL_MESH_FILES_MESH_FILE_H
 #define PAL_MESH_FILES_MESH_FILE_H
-#include "server/mesh/geometry/surface.h"
+#include "server/mesh/geometry/image_map.h"
 #include "server/mesh/geometry/tets.h"
 
 /* Default weld, of the diagonal: joins the copies of a vertex that a file writes with each of its triangles. Numbers of
@@ -13,8 +13,9 @@
 
 /* NULL stands for {0, PAL_MESH_WELD} */
 typedef struct pal_mesh_file_options {
-    double unit_m; /* metres per file unit; 0: guess with pal_mesh_unit_guess */
-    double weld;   /* relative tolerance of pal_surface_clean; < 0: do not clean at all */
+    double unit_m;        /* metres per file unit; 0: guess with pal_mesh_unit_guess */
+    double weld;          /* relative tolerance of pal_surface_clean; < 0: do not clean at all */
+    pal_image_map *image; /* becomes where an image lies on the surface, pal_image_map_free; NULL: not asked */
 } pal_mesh_file_options;
 
 /* Reads path, cleans it, scales it to metres; each reader's file says what it takes. Triangles that cleaning leaves

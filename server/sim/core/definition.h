@@ -4,6 +4,7 @@
 #ifndef PAL_SIM_CORE_DEFINITION_H
 #define PAL_SIM_CORE_DEFINITION_H
 #include "server/mesh/cells/maccracken_joy.h"
+#include "server/mesh/files/image_file.h"
 #include "server/mesh/volume/prepared.h"
 #include "server/sim/core/anatomical_axes.h"
 #include "server/sim/core/config_entry.h"
@@ -70,6 +71,7 @@ enum { PAL_STROKE_MAX = 4096 };
 typedef struct pal_body_def {
     char name[PAL_NAME];
     const pal_prepared *mesh; /* borrowed                                                        */
+    const pal_image *image;   /* shown on mesh->surface, which has uv then; borrowed; NULL: none */
     /* model subdivision_fem: control cells, body frame, borrowed; NULL for other models. mesh then has the triangles of
      * the control cells' boundary alone (surface), for size, origin and messages */
     const pal_cells *cells;

@@ -11,7 +11,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-static const pal_mesh_file_options metres = {1, 0};
+static const pal_mesh_file_options metres = {.unit_m = 1};
 
 static pal_err parse(const char *name, const void *bytes, size_t n, pal_surface *s, pal_surface_report *r,
                      pal_diagnostic *diag)
@@ -229,7 +229,7 @@ static void numbers_are_exact_and_independent_of_the_locale(void)
         char text[400];
         snprintf(text, sizeof text, "v %s 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", word[k]);
         pal_surface s = {0};
-        pal_mesh_file_options raw = {1, -1};
+        pal_mesh_file_options raw = {.unit_m = 1, .weld = -1};
         pal_err err =
             pal_mesh_file_parse("n.obj", (const uint8_t *)text, strlen(text), &raw, &s, NULL, NULL, NULL, NULL);
         if (k >= 12) {
@@ -526,7 +526,7 @@ static void a_soup_whose_corners_nearly_meet_is_closed_and_one_with_gaps_refused
         pal_surface_report r = {0};
         pal_surface_topology topology;
         pal_diagnostic diag = {""};
-        const pal_mesh_file_options mm = {1e-3, PAL_MESH_WELD};
+        const pal_mesh_file_options mm = {.unit_m = 1e-3, .weld = PAL_MESH_WELD};
         size_t n = write_soup(jitter[k], bytes, &volume, &diagonal);
         REQUIRE(n == 84 + 50 * N);
         pal_err err = pal_mesh_file_parse("soup.stl", bytes, n, &mm, &s, &r, &unit, NULL, &diag);
@@ -560,7 +560,7 @@ static void an_open_sheet_and_a_single_triangle_are_no_soup(void)
 {
     static const char *const text[] = {"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
                                        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n"};
-    const pal_mesh_file_options welded = {1, PAL_MESH_WELD};
+    const pal_mesh_file_options welded = {.unit_m = 1, .weld = PAL_MESH_WELD};
     for (int k = 0; k < 2; k++) {
         pal_surface s = {0};
         const uint8_t *bytes = (const uint8_t *)text[k];
