@@ -239,7 +239,7 @@ static void make_asset_and_frames(void)
     for (size_t i = 0; i < 4 * (size_t)s.n_vertex; i++) fprintf(expected, "%s%d", i ? "," : "", order->weight[i]);
     fprintf(expected, "]},\n\"frames\":[\n");
     need(!pal_frame_encoder_create(s.rest_m, order, &e), "encoder");
-    const pal_asset asset = {s.n_triangle, s.rest_m, s.triangle, order};
+    const pal_asset asset = {s.n_triangle, s.rest_m, NULL, s.triangle, order};
     for (int i = 0; i < GOLDEN_FRAMES; i++) make_frame(&asset, e, i, i + 1 == GOLDEN_FRAMES);
     fprintf(expected, "],\n");
     make_patch(&asset);
