@@ -13,7 +13,8 @@ const ROLL_RAD = Math.PI / 12; // turn of the instrument for a key press
  * @typedef {{
  *   state: import("./app_state.js").AppState, stage: import("./stage.js").Stage, layout: import("./layout.js").Layout,
  *   input: import("./tool_input.js").ToolInput, fields: import("./field_display.js").FieldDisplay,
- *   accuracy: import("./accuracy_panel.js").AccuracyPanel, sculpt: import("./sculpt_panel.js").SculptPanel,
+ *   accuracy: import("./accuracy_panel.js").AccuracyPanel, plots: import("./plots.js").Plots,
+ *   sculpt: import("./sculpt_panel.js").SculptPanel,
  *   send: (message: import("./control_table.js").ClientMessage) => void, showFigures: () => void
  * }} Page the parts of the page that the controls act on
  */
@@ -30,6 +31,7 @@ export class Controls {
         buttonById("reset").onclick = () => this.command("reset");
         buttonById("mesh").onclick = () => this.toggleMesh();
         buttonById("accuracy-toggle").onclick = () => this.openAccuracy(!page.accuracy.opened);
+        buttonById("plots-toggle").onclick = () => this.openPlots(!page.plots.opened);
         buttonById("panel-toggle").onclick = () => this.togglePanel();
         buttonById("help-open").onclick = () => this.openHelp();
         this.addKeys();
@@ -37,7 +39,7 @@ export class Controls {
     }
 
     addKeys() {
-        const { accuracy, fields, input, layout, sculpt, stage } = this.page;
+        const { accuracy, fields, input, layout, plots, sculpt, stage } = this.page;
         const keyboard = new KeyboardTool(stage, input, () => {
             htmlById("hint").classList.add("gone");
             layout.notice(text("hint.keys"), KEYS_MS);
@@ -48,6 +50,7 @@ export class Controls {
                 2: () => this.setMode("press"),
                 3: () => this.setMode("sculpt"),
                 4: () => this.openAccuracy(!accuracy.opened),
+                5: () => this.openPlots(!plots.opened),
                 " ": () => this.togglePause(),
                 r: () => this.command("reset"),
                 p: () => this.togglePanel(),
@@ -74,6 +77,7 @@ export class Controls {
     closePanels() {
         if (!htmlById("panel").hidden) this.togglePanel();
         this.openAccuracy(false);
+        this.openPlots(false);
     }
 
     openHelp() {
@@ -98,8 +102,8 @@ export class Controls {
     setMode(mode) {
         const { input, sculpt } = this.page;
         if (mode === "sculpt" && !sculpt.offered) return;
+        if (mode === "sculpt") this.clearLeft();
         input.mode = mode;
-        if (mode === "sculpt") this.openAccuracy(false);
         input.release();
         htmlById("sculpt").hidden = mode !== "sculpt";
         this.makeRoom(mode === "sculpt");
@@ -151,19 +155,16 @@ export class Controls {
         const panel = htmlById("panel");
         panel.hidden = !panel.hidden;
         buttonById("panel-toggle").setAttribute("aria-expanded", String(!panel.hidden));
-        if (!panel.hidden && !this.page.layout.hasRoom()) {
-            this.openAccuracy(false);
-            if (this.page.input.mode === "sculpt") this.setMode("pull");
-        }
+        if (!panel.hidden && !this.page.layout.hasRoom()) this.clearLeft();
         this.place();
         this.page.showFigures();
     }
 
     /** @param {boolean} opened */
     openAccuracy(opened) {
-        const { accuracy, input, state } = this.page;
+        const { accuracy, state } = this.page;
         if (opened && !state.hello?.estimates) return;
-        if (opened && input.mode === "sculpt") this.setMode("pull"); // both panels stand on the left
+        if (opened) this.clearLeft();
         htmlById("accuracy-panel").hidden = !opened;
         buttonById("accuracy-toggle").setAttribute("aria-expanded", String(opened));
         accuracy.open(opened);
@@ -174,5 +175,20 @@ export class Controls {
     makeRoom(opened) {
         if (opened && !htmlById("panel").hidden && !this.page.layout.hasRoom()) this.togglePanel();
         this.place();
+    }
+
+    /** @param {boolean} opened */
+    openPlots(opened) {
+        if (opened) this.clearLeft();
+        buttonById("plots-toggle").setAttribute("aria-expanded", String(opened));
+        // its height is known when the charts exist
+        this.page.plots.open(opened).then(() => this.makeRoom(opened));
+    }
+
+    /** accuracy, plots and sculpting stand in the same place: one at a time */
+    clearLeft() {
+        if (this.page.accuracy.opened) this.openAccuracy(false);
+        if (this.page.plots.opened) this.openPlots(false);
+        if (this.page.input.mode === "sculpt") this.setMode("pull");
     }
 }

@@ -54,7 +54,7 @@ const FINAL = new Map([
  *   | ({type: "part", part: number, epoch: number, rest: Float32Array, uv: Float32Array<ArrayBuffer> | null} & Shown)
  *   | ({type: "frame", part: number, shown: Shown | null} & FrameArrays)
  *   | {type: "field", part: number, name: string, low: number, high: number, level: Uint8Array}
- *   | {type: "tools", tools: import("./wire.js").Tool[]}
+ *   | {type: "tools", time: number, tools: import("./wire.js").Tool[]}
  *   | {type: "silence", seconds: number}
  *   | {type: "figures", figures: LinkFigures}} PageMessage silence: of the server, whole seconds; 0: it answers again
  */
@@ -445,7 +445,7 @@ export class Link {
             if (latency >= 0 && latency < LATENCY_MAX_MS)
                 this.latency = this.latency ? 0.9 * this.latency + 0.1 * latency : latency;
         }
-        this.env.post({ type: "tools", tools: message.tools });
+        this.env.post({ type: "tools", time: message.simTimeUs / 1e6, tools: message.tools });
         if (now - this.figuresAt > FIGURES_MS) {
             const figures = {
                 latency_ms: this.latency,

@@ -4,10 +4,13 @@ import { AccuracyPanel } from "./accuracy_panel.js";
 import { AppState } from "./app_state.js";
 import { BodySet } from "./body_set.js";
 import { ROLES } from "./control_table.js";
+import { Capture } from "./capture.js";
 import { Controls } from "./controls.js";
 import { byId, htmlById, inputById } from "./dom.js";
+import { download } from "./download.js";
 import { WRITERS } from "./exporters.js";
 import { FieldDisplay } from "./field_display.js";
+import { ForceCue } from "./force_cue.js";
 import { forceText } from "./force_text.js";
 import { Layout } from "./layout.js";
 import { MembersPanel } from "./members_panel.js";
@@ -17,6 +20,7 @@ import { OtherTools } from "./other_tools.js";
 import { pressDepth, withOwnTool } from "./own_tool.js";
 import { PlanPanel } from "./plan_panel.js";
 import { PlaybackBar } from "./playback_bar.js";
+import { Plots } from "./plots.js";
 import { PoseSender } from "./pose_sender.js";
 import { showScale } from "./scale_bar.js";
 import { SculptPanel } from "./sculpt_panel.js";
@@ -56,6 +60,9 @@ const playback = new PlaybackBar(document, sendCommand);
 const others = new OtherTools();
 const orientation = new OrientationCube(document.body);
 const accuracy = new AccuracyPanel(document, sendCommand);
+const plots = new Plots(state);
+const cue = new ForceCue(stage, state);
+const capture = new Capture(stage, state);
 const sculpt = new SculptPanel(document, sendCommand, save);
 const input = new ToolInput(
     stage,
@@ -71,8 +78,8 @@ const input = new ToolInput(
 input.onClick = (/** @type {number[]} */ position) => sculpt.click(position);
 input.onFirstDrag = () => htmlById("hint").classList.add("gone");
 const showFigures = () => messages.showFigures();
-const controls = new Controls({ state, stage, layout, input, fields, accuracy, sculpt, send, showFigures });
-const panels = { panel, members, accuracy, sculpt, playback, others, controls };
+const controls = new Controls({ state, stage, layout, input, fields, accuracy, plots, sculpt, send, showFigures });
+const panels = { panel, members, accuracy, plots, sculpt, playback, others, controls };
 const messages = new Messages({ state, stage, layout, bodies, fields, input, marks, send, ...panels });
 worker.onmessage = (/** @type {MessageEvent<import("./link.js").PageMessage>} */ { data }) => messages.take(data);
 
@@ -90,10 +97,7 @@ function makeStage() {
 /** downloads the shown surfaces as a file @param {string} format key of WRITERS */
 function save(format) {
     const surfaces = [...state.bodies.values()].map((body) => body.surface());
-    const name = (state.hello?.session ?? "palpate").replace(/[^\w-]+/g, "_");
-    const href = URL.createObjectURL(new Blob([WRITERS[format](surfaces)]));
-    Object.assign(document.createElement("a"), { href, download: `${name}.${format}` }).click();
-    setTimeout(() => URL.revokeObjectURL(href), 10000);
+    download(new Blob([WRITERS[format](surfaces)]), state.hello?.session ?? "", `.${format}`);
 }
 
 function showForce() {
@@ -113,6 +117,7 @@ function draw() {
     const now = performance.now();
     if (stage.ready()) {
         marks.depth = pressDepth(input.drag, state.ownToolState());
+        cue.update(now);
         if (bodies.applyFrames()) {
             stage.dirty = true;
             nDrawn++;
@@ -136,6 +141,7 @@ function draw() {
             showForce();
             showScale(htmlById("scale"), stage.pixelsPerMetre());
             orientation.show(state.hello?.anatomical_axes ?? "", stage.camera.matrixWorldInverse.elements);
+            capture.drawn();
         }
     }
     if (now - countedAt > 1000) {
@@ -170,6 +176,6 @@ inputById("name").onchange = () => {
     connect();
 };
 // read-only access for tests and for the console
-Object.defineProperty(window, "palpate", { value: { state, stage, input, marks, accuracy } });
+Object.defineProperty(window, "palpate", { value: { state, stage, input, marks, accuracy, plots, capture, cue } });
 connect();
 draw();

@@ -15,7 +15,7 @@ import { sameTools } from "./tool_marks.js";
  *   bodies: import("./body_set.js").BodySet, fields: import("./field_display.js").FieldDisplay,
  *   input: import("./tool_input.js").ToolInput, marks: import("./tool_marks.js").ToolMarks,
  *   panel: import("./plan_panel.js").PlanPanel, members: import("./members_panel.js").MembersPanel,
- *   accuracy: import("./accuracy_panel.js").AccuracyPanel,
+ *   accuracy: import("./accuracy_panel.js").AccuracyPanel, plots: import("./plots.js").Plots,
  *   sculpt: import("./sculpt_panel.js").SculptPanel, playback: import("./playback_bar.js").PlaybackBar,
  *   others: import("./other_tools.js").OtherTools, controls: import("./controls.js").Controls,
  *   send: (message: import("./control_table.js").ClientMessage) => void
@@ -69,6 +69,7 @@ export class Messages {
                 if (!sameTools(marks.drawn, data.tools, UNSEEN * stage.size)) stage.dirty = true;
                 state.tools = data.tools;
                 this.page.others.take(data.tools, performance.now());
+                this.page.plots.take(data.time, data.tools);
                 break;
             case "silence":
                 layout.silence(data.seconds);

@@ -1,4 +1,5 @@
 // The stage: renderer, light, camera and its orbit. Lengths are metres of the scene frame; `up` is the scene's.
+import { makeBackdrop } from "./backdrop.js";
 import { Pace } from "./pace.js";
 import * as THREE from "./three.js";
 
@@ -289,21 +290,4 @@ export class Stage {
         if (p.z > 1) return null;
         return { x: ((p.x + 1) / 2) * this.canvas.clientWidth, y: ((1 - p.y) / 2) * this.canvas.clientHeight };
     }
-}
-
-/** @returns {THREE.Texture} a dark vertical gradient */
-/** @param {boolean} light */
-function makeBackdrop(light) {
-    const canvas = document.createElement("canvas");
-    canvas.width = 2;
-    canvas.height = 256;
-    const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
-    const gradient = context.createLinearGradient(0, 0, 0, 256);
-    const colours = light ? ["#eef3f7", "#dde5ec", "#c3ced8"] : ["#1d2831", "#141b22", "#0b0f13"];
-    [0, 0.55, 1].forEach((at, i) => gradient.addColorStop(at, colours[i]));
-    context.fillStyle = gradient;
-    context.fillRect(0, 0, 2, 256);
-    const texture = new THREE.CanvasTexture(canvas);
-    texture.colorSpace = THREE.SRGBColorSpace;
-    return texture;
 }
