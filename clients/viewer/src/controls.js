@@ -14,6 +14,7 @@ const ROLL_RAD = Math.PI / 12; // turn of the instrument for a key press
  *   state: import("./app_state.js").AppState, stage: import("./stage.js").Stage, layout: import("./layout.js").Layout,
  *   input: import("./tool_input.js").ToolInput, fields: import("./field_display.js").FieldDisplay,
  *   accuracy: import("./accuracy_panel.js").AccuracyPanel, sculpt: import("./sculpt_panel.js").SculptPanel,
+ *   viewMenu: import("./view_menu.js").ViewMenu,
  *   send: (message: import("./control_table.js").ClientMessage) => void, showFigures: () => void
  * }} Page the parts of the page that the controls act on
  */
@@ -37,7 +38,7 @@ export class Controls {
     }
 
     addKeys() {
-        const { accuracy, fields, input, layout, sculpt, stage } = this.page;
+        const { accuracy, fields, input, layout, sculpt, stage, viewMenu } = this.page;
         const keyboard = new KeyboardTool(stage, input, () => {
             htmlById("hint").classList.add("gone");
             layout.notice(text("hint.keys"), KEYS_MS);
@@ -55,6 +56,7 @@ export class Controls {
                 m: () => this.toggleMesh(),
                 q: () => input.roll(-ROLL_RAD),
                 w: () => input.roll(ROLL_RAD),
+                e: () => viewMenu.toggleEndoscope(),
                 "?": () => this.openHelp(),
                 f1: () => this.openHelp(),
                 escape: () => this.closePanels(),

@@ -26,6 +26,8 @@ import { language, text } from "./text.js";
 import { takeTicket } from "./ticket.js";
 import { ToolInput } from "./tool_input.js";
 import { ToolMarks } from "./tool_marks.js";
+import { ViewMenu } from "./view_menu.js";
+import { ViewModes } from "./view_modes.js";
 
 const FORCE_MIN_N = 0.005; // a smaller force is displayed as 0.00
 const SLOW_NOTICE_MS = 12000;
@@ -70,8 +72,14 @@ const input = new ToolInput(
 );
 input.onClick = (/** @type {number[]} */ position) => sculpt.click(position);
 input.onFirstDrag = () => htmlById("hint").classList.add("gone");
+const views = new ViewModes(
+    stage,
+    (ray) => bodies.pick(ray),
+    () => {},
+);
+const viewMenu = new ViewMenu(stage, views);
 const showFigures = () => messages.showFigures();
-const controls = new Controls({ state, stage, layout, input, fields, accuracy, sculpt, send, showFigures });
+const controls = new Controls({ state, stage, layout, input, fields, accuracy, sculpt, viewMenu, send, showFigures });
 const panels = { panel, members, accuracy, sculpt, playback, others, controls };
 const messages = new Messages({ state, stage, layout, bodies, fields, input, marks, send, ...panels });
 worker.onmessage = (/** @type {MessageEvent<import("./link.js").PageMessage>} */ { data }) => messages.take(data);
@@ -170,6 +178,6 @@ inputById("name").onchange = () => {
     connect();
 };
 // read-only access for tests and for the console
-Object.defineProperty(window, "palpate", { value: { state, stage, input, marks, accuracy } });
+Object.defineProperty(window, "palpate", { value: { state, stage, input, marks, accuracy, views } });
 connect();
 draw();

@@ -330,6 +330,17 @@ export const GERMAN = {
     "tools.step.tip": "Ein Schritt, solange angehalten ist",
     "view.label":
         "Das Organ. Ziehen Sie daran, oder daneben, um sich umzusehen. Mit der Tastatur: Eingabe setzt das Instrument auf das Organ, Pfeiltasten bewegen es, Bild auf und Bild ab heben und senken es, Escape lässt los.",
+    "views.open": "Ansicht",
+    "views.open.tip": "Endoskop, gespeicherte Ansichten, zwei Ansichten nebeneinander",
+    "views.menu": "Ansichten",
+    "views.endoscope": "Endoskop",
+    "views.endoscope.tip": "Durch ein Endoskop sehen (E)",
+    "views.endoscope.how":
+        "Neben dem Organ oder auf dem dunklen Rand ziehen schwenkt das Endoskop um seinen Port. Das Mausrad schiebt es vor und zurück.",
+    "views.angled": "30°-Optik",
+    "views.angled.tip": "Eine Optik, die 30 Grad schräg zum Schaft blickt",
+    "views.turn": "Drehung der Optik",
+    "views.roll": "Neigung des Bildes",
     "wait.server": "Warte auf den Server",
     "orientation.tip": "Richtungen des Patienten: R rechts, L links, A vorn, P hinten, S zum Kopf, I zu den Füßen",
     "orientation.label": "Ausrichtung: gesehen von {side}",

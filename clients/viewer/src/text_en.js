@@ -329,6 +329,17 @@ export const ENGLISH = {
     "tools.step.tip": "One step while paused",
     "view.label":
         "The organ. Drag it to pull, drag beside it to look around. By keyboard: Enter puts the tool on the organ, the arrow keys move it, Page Up and Page Down lift and lower it, Escape lets go.",
+    "views.open": "View",
+    "views.open.tip": "Endoscope, saved views, two views side by side",
+    "views.menu": "Views",
+    "views.endoscope": "Endoscope",
+    "views.endoscope.tip": "Look through an endoscope (E)",
+    "views.endoscope.how":
+        "Drag beside the organ or on the dark rim to turn the endoscope about its port. The wheel inserts and withdraws it.",
+    "views.angled": "30° optics",
+    "views.angled.tip": "Optics that look 30 degrees aside from the shaft",
+    "views.turn": "Turn of the optics",
+    "views.roll": "Roll of the picture",
     "wait.server": "Waiting for the server",
     "orientation.tip":
         "Directions of the patient: R right, L left, A front, P back, S towards the head, I towards the feet",
