@@ -113,8 +113,11 @@ async function endoscope(page) {
     await page.mouse.wheel(0, -120);
     await until(async () => (await value(page, "views.scope.pose.depth")) > depth);
     check("the wheel inserts it", (await value(page, "views.scope.pose.depth")) > depth);
-    for (let i = 0; i < 10; i++) await page.mouse.wheel(0, -400);
-    await nextFrame(page);
+    for (let i = 0; i < 4; i++) {
+        const before = await value(page, "views.scope.pose.depth");
+        await page.evaluate(() => window.palpate.stage.zoom(0.5));
+        if ((await value(page, "views.scope.pose.depth")) === before) break;
+    }
     const ahead = await value(
         page,
         "(({ pose }) => views.scope.reach(stage.camera.position.toArray(), stage.camera.getWorldDirection(stage.camera.up.clone()).toArray()) / stage.size)(views.scope)",
@@ -140,11 +143,61 @@ async function endoscope(page) {
     check("E leaves the endoscope, and the light is as before", Math.abs(again[0] - lit[0]) < 3, `${lit} ${again}`);
 }
 
+async function savedViews(page) {
+    const camera = () => value(page, "[...stage.placeCameras() ?? stage.camera.position.toArray()]");
+    const home = await camera();
+    await page.keyboard.press("v");
+    await page.click("#view-toggle");
+    await page.click("#view-standard button:nth-child(5)");
+    const up = () => value(page, "stage.camera.position.clone().sub(stage.centre).normalize().dot(stage.up)");
+    check("a standard view looks from above", (await until(up, (c) => c > 0.9999)) > 0.9999);
+    await page.fill("#view-name", "From above");
+    await page.keyboard.press("Enter");
+    const names = await page.locator("#view-saved button:first-child").allTextContents();
+    check("two views are saved, by number and by name", names.join() === "View 1,From above", names.join());
+    await page.screenshot({ path: join(pictures, "views_saved.png") });
+    await page.keyboard.press("ArrowUp");
+    await page.keyboard.press("ArrowUp");
+    const focused = await page.evaluate(() => document.activeElement?.textContent);
+    check("arrow keys go through the menu", focused === "From above", focused);
+    await page.keyboard.press("Escape");
+    check("and Escape leaves it", (await page.evaluate(() => document.activeElement?.id)) === "view-toggle");
+    // the way there, picture by picture
+    const way = await page.evaluate(async () => {
+        const { stage } = window.palpate;
+        const heights = [];
+        dispatchEvent(new KeyboardEvent("keydown", { key: "!", code: "Digit1", shiftKey: true }));
+        for (let i = 0; i < 300 && !(heights.length > 3 && heights.at(-1) === heights.at(-3)); i++) {
+            await new Promise(requestAnimationFrame);
+            stage.placeCameras();
+            heights.push(stage.camera.position.clone().sub(stage.centre).dot(stage.up));
+        }
+        return heights;
+    });
+    check(
+        "the way to a saved view is even",
+        way.every((h, i) => i === 0 || h <= way[i - 1] + 1e-9),
+        `${way.length} pictures`,
+    );
+    const back = await camera();
+    const off = Math.hypot(...back.map((c, k) => c - home[k]));
+    check("and ends there", off < 1e-9, `${off} m`);
+    await page.reload();
+    await page.waitForFunction(() => window.palpate?.state.bodies.size > 0 && window.palpate.state.status);
+    await page.click("#view-toggle");
+    const kept = await page.locator("#view-saved button:first-child").allTextContents();
+    check("saved views outlast the page", kept.join() === names.join(), kept.join());
+    await page.click("#view-saved li:nth-child(2) button:nth-child(2)");
+    check("a saved view can be deleted", (await page.locator("#view-saved li").count()) === 1);
+    await page.keyboard.press("Escape");
+}
+
 await run(async () => {
     const server = await serve(prepare(), 0);
     const browser = await launch();
     const page = await open(browser, `http://127.0.0.1:${server.info.port}/`, "Ada", { width: 1280, height: 800 });
     await settled(page, () => 0.0005, 1);
     await endoscope(page);
+    await savedViews(page);
     checkConsoles();
 });

@@ -57,6 +57,7 @@ export class Controls {
                 q: () => input.roll(-ROLL_RAD),
                 w: () => input.roll(ROLL_RAD),
                 e: () => viewMenu.toggleEndoscope(),
+                v: () => viewMenu.save(),
                 "?": () => this.openHelp(),
                 f1: () => this.openHelp(),
                 escape: () => this.closePanels(),
@@ -66,7 +67,8 @@ export class Controls {
         window.addEventListener("keydown", (e) => {
             // an open dialog has the keyboard; it closes with Escape by itself
             if (byId("help", HTMLDialogElement).open) return;
-            const action = keyboard.key(e) || sculpt.key(e) ? () => {} : actionOf(e);
+            const handled = keyboard.key(e) || sculpt.key(e) || viewMenu.goByKey(e);
+            const action = handled ? () => {} : actionOf(e);
             if (!action) return;
             e.preventDefault();
             action();

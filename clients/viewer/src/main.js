@@ -77,7 +77,7 @@ const views = new ViewModes(
     (ray) => bodies.pick(ray),
     () => {},
 );
-const viewMenu = new ViewMenu(stage, views);
+const viewMenu = new ViewMenu(state, stage, views);
 const showFigures = () => messages.showFigures();
 const controls = new Controls({ state, stage, layout, input, fields, accuracy, sculpt, viewMenu, send, showFigures });
 const panels = { panel, members, accuracy, sculpt, playback, others, controls };

@@ -6,7 +6,7 @@ const HOME_SHARE = 0.88; // of the picture's height: initial size of the scene's
 const ZOOM_MIN = 0.45; // beside panels
 const HOME = { azimuth: -0.6, elevation: 0.42 }; // rad
 const TURN = 4; // rad for a drag over the height of the picture
-const ELEVATION_MAX = 1.5; // rad: at the pole the azimuth has no meaning
+const ELEVATION_MAX = 1.57; // rad: at the pole the camera has no horizon
 
 export class OrbitView {
     kind = /** @type {const} */ ("free");
@@ -115,6 +115,6 @@ export class OrbitView {
         this.target.set(values.x, values.y, values.z);
         this.distance = values.near * this.homeDistance();
         this.azimuth = values.azimuth;
-        this.elevation = values.elevation;
+        this.elevation = Math.max(-ELEVATION_MAX, Math.min(ELEVATION_MAX, values.elevation));
     }
 }

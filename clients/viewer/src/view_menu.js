@@ -1,17 +1,28 @@
 // The menu of views: a button that opens it, what it offers, and its keys.
-import { buttonById, htmlById, inputById } from "./dom.js";
+import { buttonById, byId, htmlById, inputById } from "./dom.js";
+import { nextName, readViews, withView } from "./saved_views.js";
+import { STANDARD } from "./standard_views.js";
 import { text } from "./text.js";
 
+/** @param {string} textContent */
+const makeButton = (textContent) => Object.assign(document.createElement("button"), { type: "button", textContent });
+/** @param {number} number */
+const named = (number) => text("views.numbered", { number });
 const HINT_MS = 7000; // two sentences are read
 const DEGREE = Math.PI / 180;
 
 export class ViewMenu {
     explained = false; // how an endoscope is moved
+    hintTimer = 0;
+    /** @type {import("./saved_views.js").Saved[]} */
+    unstored = [];
 
     /**
-     * @param {import("./stage.js").Stage} stage @param {import("./view_modes.js").ViewModes} modes
+     * @param {import("./app_state.js").AppState} state @param {import("./stage.js").Stage} stage
+     * @param {import("./view_modes.js").ViewModes} modes
      */
-    constructor(stage, modes) {
+    constructor(state, stage, modes) {
+        this.state = state;
         this.stage = stage;
         this.modes = modes;
         this.menu = htmlById("view-menu");
@@ -30,6 +41,17 @@ export class ViewMenu {
                 modes.scope?.take({ ...modes.scope.pose, [key]: Number(inputById("view-" + key).value) * DEGREE });
                 stage.dirty = true;
             };
+        htmlById("view-standard").append(
+            ...STANDARD.map((from) => {
+                const button = makeButton(text(`views.standard.${from}`));
+                button.onclick = () => modes.goStandard(from, this.axes());
+                return button;
+            }),
+        );
+        byId("view-save", HTMLFormElement).onsubmit = (e) => {
+            e.preventDefault();
+            this.save(inputById("view-name").value.trim());
+        };
         modes.changed = () => this.show();
     }
 
@@ -77,11 +99,80 @@ export class ViewMenu {
         const hint = htmlById("view-hint");
         hint.textContent = sentence;
         hint.hidden = false;
-        setTimeout(() => (hint.hidden = true), HINT_MS);
+        clearTimeout(this.hintTimer);
+        this.hintTimer = window.setTimeout(() => (hint.hidden = true), HINT_MS);
+    }
+
+    /** of the patient, "" unknown @returns {string} */
+    axes() {
+        return /** @type {{anatomical_axes?: string}} */ (this.state.hello ?? {}).anatomical_axes ?? "";
+    }
+
+    get storage() {
+        return `palpate.views.${this.state.hello?.session ?? ""}`;
+    }
+
+    /** without storage they last as long as the page @returns {import("./saved_views.js").Saved[]} */
+    saved() {
+        try {
+            return readViews(localStorage.getItem(this.storage));
+        } catch {
+            return this.unstored;
+        }
+    }
+
+    /** @param {import("./saved_views.js").Saved[]} views */
+    store(views) {
+        this.unstored = views;
+        try {
+            localStorage.setItem(this.storage, JSON.stringify(views));
+        } catch {
+            // as saved() says
+        }
+        this.showSaved();
+    }
+
+    /** @param {string} wanted "" : the next number */
+    save(wanted = "") {
+        const views = this.saved();
+        const name = wanted || nextName(views, named);
+        this.store(withView(views, name, this.modes.shot()));
+        inputById("view-name").value = "";
+        this.hint(text("views.saved.done", { name }));
+    }
+
+    /** Shift and a digit go to a saved view @param {KeyboardEvent} e @returns {boolean} it was that */
+    goByKey(e) {
+        const digit = e.shiftKey && !(e.target instanceof HTMLInputElement) ? /^Digit([1-9])$/.exec(e.code) : null;
+        if (!digit) return false;
+        const view = this.saved()[Number(digit[1]) - 1];
+        if (view) this.modes.go(view.shot);
+        return true;
+    }
+
+    showSaved() {
+        htmlById("view-saved").replaceChildren(
+            ...this.saved().map(({ name, shot }) => {
+                const go = makeButton(name);
+                go.onclick = () => this.modes.go(shot);
+                const remove = makeButton("×");
+                remove.ariaLabel = remove.title = text("views.delete", { name });
+                remove.onclick = () => {
+                    this.store(this.saved().filter((view) => view.name !== name));
+                    inputById("view-name").focus();
+                };
+                const [item, row] = [document.createElement("li"), document.createElement("div")];
+                row.append(go, remove);
+                item.append(row);
+                return item;
+            }),
+        );
+        inputById("view-name").placeholder = nextName(this.saved(), named);
     }
 
     /** the state of the views */
     show() {
+        if (!this.menu.hidden) this.showSaved();
         const { scope } = this.modes;
         buttonById("view-endoscope").setAttribute("aria-pressed", String(scope !== null));
         htmlById("view-scope").hidden = scope === null;

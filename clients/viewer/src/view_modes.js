@@ -1,12 +1,15 @@
 // Which views the page shows: the free one, an endoscope, both side by side, or one for each eye. What is not used does not
 // exist: it is made and loaded when it is chosen first.
 import { OrbitView } from "./orbit_view.js";
+import { MOVE_MS, between, smooth } from "./saved_views.js";
+import { standardView } from "./standard_views.js";
 import { ViewPane } from "./view_pane.js";
 
 /** @typedef {import("./endoscope.js").Endoscope} Endoscope */
 /** @typedef {{pane: ViewPane, free: OrbitView | null, scope: Endoscope | null}} Side what a pane can show */
 
 export class ViewModes {
+    moving = 0; // from one view to another: the request of the next picture
     split = false;
     stereo = false;
 
@@ -55,6 +58,39 @@ export class ViewModes {
     add(view) {
         this.stage.views.push(view);
         return view;
+    }
+
+    /** of the pane that takes the input */
+    shot() {
+        return this.stage.view.state();
+    }
+
+    /** moves the pane that takes the input to a view @param {import("./saved_views.js").Shot} shot */
+    async go(shot) {
+        const { side, stage } = this;
+        cancelAnimationFrame(this.moving);
+        if (side.pane.view.kind !== shot.kind) await this.show(side, shot.kind);
+        const { view } = side.pane;
+        const from = view.state();
+        const begin = performance.now();
+        const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+        const step = () => {
+            const t = still ? 1 : Math.min(1, (performance.now() - begin) / MOVE_MS);
+            view.restore(t < 1 ? between(from, shot, smooth(t)) : shot);
+            stage.dirty = true;
+            if (t < 1) this.moving = requestAnimationFrame(step);
+            else this.changed();
+        };
+        step();
+    }
+
+    /** @param {typeof import("./standard_views.js").STANDARD[number]} from @param {string} axes of the patient, "" unknown */
+    goStandard(from, axes) {
+        const { stage } = this;
+        const [a, b] = stage.ground();
+        const ground = { a: a.toArray(), b: b.toArray(), up: stage.up.toArray() };
+        const [x, y, z] = stage.centre.toArray();
+        return this.go({ kind: "free", values: { x, y, z, near: 1, ...standardView(from, ground, axes) } });
     }
 
     toggleEndoscope() {
