@@ -1,5 +1,5 @@
 // The views of one page: an endoscope, saved views, two views side by side, stereo and a headset.
-// usage: node views.mjs BUILD PICTURES     ends with "N passed, N failed"
+// usage: node views.mjs BUILD PICTURES [sharp]     ends with "N passed, N failed"
 import { join } from "node:path";
 import {
     check,
@@ -18,18 +18,19 @@ import {
     until,
 } from "./common.mjs";
 
+/** sharp: pictures as a graphics card draws them; software needs seconds for each */
+const sharp = process.argv[4] === "sharp";
+
 /** the picture as it is once everything is drawn */
 async function picture(page, name) {
-    const was = await page.evaluate(() => {
-        const { stage } = window.palpate;
-        const was = stage.pace.resolution;
-        stage.pace.resolution = 1; // judged as a graphics card draws it
-        stage.resize();
-        return was;
-    });
-    await until(() => page.evaluate(() => !window.palpate.stage.dirty && window.palpate.stage.ready()));
+    if (sharp)
+        await page.evaluate(() => {
+            const { stage } = window.palpate;
+            stage.pace.resolution = 1;
+            stage.resize();
+        });
+    await until(() => value(page, "!stage.dirty && stage.ready()"));
     await page.screenshot({ path: join(pictures, `${name}.png`) });
-    await page.evaluate((r) => (window.palpate.stage.pace.resolution = r), was);
 }
 
 /** brightness of the canvas at shares of its size, 0 to 255 */
@@ -58,7 +59,7 @@ const value = (page, expression) =>
 const pickingError = (page, pixel) =>
     page.evaluate(({ x, y }) => {
         const { stage, input } = window.palpate;
-        stage.choose(x);
+        stage.choose({ clientX: x, clientY: y });
         const hit = input.pick(stage.ray(x, y));
         const p = hit && stage.project(hit.point);
         return p ? Math.hypot(p.x - x, p.y - y) : NaN;
@@ -120,7 +121,7 @@ async function endoscope(page) {
     }
     const ahead = await value(
         page,
-        "(({ pose }) => views.scope.reach(stage.camera.position.toArray(), stage.camera.getWorldDirection(stage.camera.up.clone()).toArray()) / stage.size)(views.scope)",
+        "stage.placeCameras() ?? (({ pose }) => views.scope.reach(stage.camera.position.toArray(), stage.camera.getWorldDirection(stage.camera.up.clone()).toArray()) / stage.size)(views.scope)",
     );
     check("but not into tissue", ahead > 0.05, `${ahead.toFixed(3)} sizes before it`);
 
@@ -192,6 +193,122 @@ async function savedViews(page) {
     await page.keyboard.press("Escape");
 }
 
+/** a pixel on the organ in a box of shares of the page */
+const pixelIn = (page, [left, top, right, bottom]) =>
+    page.evaluate(
+        ([left, top, right, bottom]) => {
+            const { stage, input } = window.palpate;
+            for (let i = 1; i < 20; i++)
+                for (let j = 1; j < 20; j++) {
+                    const x = innerWidth * (left + ((right - left) * ((7 * i) % 20)) / 20);
+                    const y = innerHeight * (top + ((bottom - top) * ((7 * j) % 20)) / 20);
+                    stage.choose({ clientX: x, clientY: y });
+                    if (
+                        document.elementFromPoint(x, y)?.id === "view" &&
+                        stage.sees(x, y) &&
+                        input.pick(stage.ray(x, y))
+                    )
+                        return { x, y };
+                }
+            return null;
+        },
+        [left, top, right, bottom],
+    );
+
+async function splitView(page) {
+    await page.click("#view-toggle");
+    await page.click("#view-split");
+    await until(() => value(page, "views.split && stage.panes.length === 2"));
+    await page.keyboard.press("Escape");
+    const [free, dark] = await brightness(page, [
+        [0.01, 0.5],
+        [0.99, 0.95],
+    ]);
+    check("two views stand side by side", free > 100 && dark < 12, `${free} ${dark}`);
+    await picture(page, "views_split");
+    const kinds = [];
+    for (const box of [
+        [0, 0.2, 0.5, 0.8],
+        [0.5, 0.2, 1, 0.8],
+    ]) {
+        const pixel = await pixelIn(page, box);
+        const error = await pickingError(page, pixel);
+        const kind = await value(page, "stage.view.kind");
+        const pulled = await pull(page, pixel);
+        check(
+            `the ${kind} view of the two is exact, and pulls`,
+            error < 0.5 && pulled > 0.008,
+            `${error.toFixed(3)} px`,
+        );
+        kinds.push(kind);
+    }
+    check("each has its own camera", kinds.join() === "free,endoscope", kinds.join());
+    const cameras = () =>
+        value(page, "stage.panes.map(({ view }) => [view.state().values.near, view.state().values.depth])");
+    const before = await cameras();
+    await page.mouse.move(300, 90);
+    await page.mouse.wheel(0, 200);
+    await until(async () => (await cameras())[0][0] !== before[0][0]);
+    const after = await cameras();
+    check("the wheel acts in the view under the pointer", after[1][1] === before[1][1] && after[0][0] > before[0][0]);
+    await page.setViewportSize({ width: 390, height: 844 });
+    await picture(page, "views_split_phone");
+    const below = await pixelIn(page, [0, 0.5, 1, 0.85]);
+    const error = await pickingError(page, below);
+    check(
+        "on a phone they are stacked",
+        error < 0.5 && (await value(page, "stage.view.kind")) === "endoscope",
+        String(error),
+    );
+    const outside = await page.evaluate(() => {
+        document.getElementById("view-toggle").click();
+        const { left, top, right, bottom } = document.getElementById("view-menu").getBoundingClientRect();
+        return left < 0 || top < 0 || right > innerWidth || bottom > innerHeight;
+    });
+    check("and the menu is within the page", !outside);
+    await picture(page, "views_menu_phone");
+    await page.click("#view-split");
+    await until(() => value(page, "stage.panes.length === 1"));
+    check("one view again: the one that was worked in", (await value(page, "stage.view.kind")) === "endoscope");
+    await page.keyboard.press("Escape");
+    await picture(page, "views_endoscope_phone");
+    await page.setViewportSize({ width: 1280, height: 800 });
+    await page.keyboard.press("e");
+    await until(() => value(page, "views.scope === null"));
+}
+
+async function stereo(page) {
+    await page.click("#view-toggle");
+    await page.click("#view-stereo");
+    await until(() => value(page, "views.stereo && stage.panes.length === 2"));
+    await page.keyboard.press("Escape");
+    await picture(page, "views_stereo");
+    const xs = await value(
+        page,
+        "stage.panes.map((pane) => { stage.pane = pane; stage.placeCameras(); return [0, 0.1].map((d) => stage.project(stage.centre.clone().addScaledVector(stage.view.away(), d)).x - pane.box(stage.canvas).x) })",
+    );
+    const [middle, nearer] = [0, 1].map((k) => xs[0][k] - xs[1][k]);
+    check(
+        "the eyes meet in the middle of the scene, and see what is nearer apart",
+        Math.abs(middle) < 0.01 && nearer > 2,
+        `${middle.toFixed(3)} ${nearer.toFixed(1)} px`,
+    );
+    for (const box of [
+        [0, 0.2, 0.5, 0.8],
+        [0.5, 0.2, 1, 0.8],
+    ]) {
+        const error = await pickingError(page, await pixelIn(page, box));
+        check("picking is exact in the picture of an eye", error < 0.5, `${error.toFixed(3)} px`);
+    }
+    await page.keyboard.press("e");
+    await until(() => value(page, "views.scope !== null"));
+    await picture(page, "views_stereo_endoscope");
+    await page.keyboard.press("e");
+    await until(() => value(page, "views.scope === null"));
+    await page.evaluate(() => window.palpate.views.setStereo(false));
+    check("one picture again", await value(page, "stage.panes.length === 1 && stage.camera === stage.free.camera"));
+}
+
 await run(async () => {
     const server = await serve(prepare(), 0);
     const browser = await launch();
@@ -199,5 +316,7 @@ await run(async () => {
     await settled(page, () => 0.0005, 1);
     await endoscope(page);
     await savedViews(page);
+    await splitView(page);
+    await stereo(page);
     checkConsoles();
 });

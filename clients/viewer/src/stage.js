@@ -155,13 +155,23 @@ export class Stage {
     /** fits the views into their panes */
     fit() {
         for (const pane of this.panes) pane.fit(this.canvas, this.left, this.right, this.bottom);
+        this.placeCameras();
         this.dirty = true;
     }
 
-    /** the pane under the pointer takes the input @param {number} x client pixels */
-    choose(x) {
-        const share = (x - this.canvas.getBoundingClientRect().left) / (this.canvas.clientWidth || 1);
-        const pane = this.panes.find((candidate) => share < candidate.left + candidate.width) ?? this.panes[0];
+    /** the pane at a point of the page @param {number} x @param {number} y client pixels */
+    paneAt(x, y) {
+        const { left, top } = this.canvas.getBoundingClientRect();
+        const inside = (/** @type {ViewPane} */ pane) => {
+            const box = pane.box(this.canvas);
+            return x - left < box.x + box.width && y - top < box.y + box.height;
+        };
+        return this.panes.find(inside) ?? this.pane;
+    }
+
+    /** the pane under the pointer takes the input @param {{clientX: number, clientY: number}} pointer */
+    choose({ clientX, clientY }) {
+        const pane = this.paneAt(clientX, clientY);
         if (pane !== this.pane) this.dirty = true; // names stand in the pane that is worked in
         this.pane = pane;
     }
@@ -248,9 +258,10 @@ export class Stage {
         if (this.panes.length === 1) return this.view.draw(this.camera, () => this.render(this.camera));
         this.renderer.setScissorTest(true);
         for (const pane of this.panes) {
-            const { x, width, height } = pane.box(this.canvas);
-            this.renderer.setViewport(x, 0, width, height);
-            this.renderer.setScissor(x, 0, width, height);
+            const { x, y, width, height } = pane.box(this.canvas);
+            const below = (this.canvas.clientHeight || 1) - y - height;
+            this.renderer.setViewport(x, below, width, height);
+            this.renderer.setScissor(x, below, width, height);
             pane.view.draw(pane.camera, () => this.renderer.render(this.scene, pane.camera));
         }
         this.renderer.setScissorTest(false);
@@ -283,7 +294,7 @@ export class Stage {
     /** of a metre at the depth of the middle of the view */
     pixelsPerMetre() {
         const half = Math.tan((this.camera.fov * Math.PI) / 360) * this.view.depth();
-        return ((this.canvas.clientHeight || 1) * this.camera.zoom) / (2 * half);
+        return (this.pane.box(this.canvas).height * this.camera.zoom) / (2 * half);
     }
 
     /** ray through a pixel @param {number} x @param {number} y client pixels @returns {THREE.Ray} */
@@ -292,7 +303,7 @@ export class Stage {
         const box = this.pane.box(this.canvas);
         const ndc = new THREE.Vector2(
             ((x - outer.left - box.x) / box.width) * 2 - 1,
-            1 - ((y - outer.top) / box.height) * 2,
+            1 - ((y - outer.top - box.y) / box.height) * 2,
         );
         this.placeCameras();
         const caster = new THREE.Raycaster();
@@ -303,15 +314,16 @@ export class Stage {
     /** is a pixel part of the picture, not of its surround? @param {number} x @param {number} y client pixels */
     sees(x, y) {
         const outer = this.canvas.getBoundingClientRect();
-        return this.view.sees(x - outer.left - this.pane.box(this.canvas).x, y - outer.top);
+        const box = this.pane.box(this.canvas);
+        return this.view.sees(x - outer.left - box.x, y - outer.top - box.y);
     }
 
     /** client pixels of a point, null behind the camera @param {THREE.Vector3} point @returns {{x: number, y: number} | null} */
     project(point) {
         const p = point.clone().project(this.camera);
         if (p.z > 1) return null;
-        const { x, width, height } = this.pane.box(this.canvas);
-        return { x: x + ((p.x + 1) / 2) * width, y: ((1 - p.y) / 2) * height };
+        const { x, y, width, height } = this.pane.box(this.canvas);
+        return { x: x + ((p.x + 1) / 2) * width, y: y + ((1 - p.y) / 2) * height };
     }
 }
 

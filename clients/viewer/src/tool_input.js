@@ -46,7 +46,7 @@ export class ToolInput {
         c.addEventListener("contextmenu", (e) => e.preventDefault());
         c.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
         c.addEventListener("dblclick", (e) => {
-            stage.choose(e.clientX);
+            stage.choose(e);
             if (!this.hit(e)) stage.home();
         });
     }
@@ -67,7 +67,7 @@ export class ToolInput {
             this.clickStart = null;
             return;
         }
-        this.stage.choose(e.clientX);
+        this.stage.choose(e);
         this.clickStart = null;
         if (this.mode === "sculpt") {
             const at = e.button === 0 ? this.hit(e) : null;
@@ -102,7 +102,7 @@ export class ToolInput {
     move(e) {
         const last = this.pointers.get(e.pointerId);
         if (!last) {
-            this.stage.choose(e.clientX);
+            this.stage.choose(e);
             if (e.pointerType === "mouse")
                 this.stage.canvas.classList.toggle("over", (this.enabled || this.mode === "sculpt") && this.hover(e));
             return;
@@ -172,7 +172,7 @@ export class ToolInput {
             this.drag.deeper -= amount * 1e-4 * this.stage.size;
             this.tick();
         } else {
-            this.stage.choose(e.clientX);
+            this.stage.choose(e);
             this.stage.zoom(Math.exp(amount * 0.0012));
         }
     }

@@ -36,6 +36,9 @@ export class ViewMenu {
         });
         buttonById("view-endoscope").onclick = () => this.toggleEndoscope();
         buttonById("view-angled").onclick = () => modes.setAngle(modes.scope?.pose.angle ? 0 : 30);
+        buttonById("view-split").onclick = () => modes.setSplit(!modes.split);
+        buttonById("view-stereo").onclick = () => modes.setStereo(!modes.stereo);
+        window.addEventListener("resize", () => this.show());
         for (const key of /** @type {const} */ (["turn", "roll"]))
             inputById("view-" + key).oninput = () => {
                 modes.scope?.take({ ...modes.scope.pose, [key]: Number(inputById("view-" + key).value) * DEGREE });
@@ -176,7 +179,12 @@ export class ViewMenu {
         const { scope } = this.modes;
         buttonById("view-endoscope").setAttribute("aria-pressed", String(scope !== null));
         htmlById("view-scope").hidden = scope === null;
-        document.body.classList.toggle("surround", this.stage.panes[0].view.kind === "endoscope");
+        for (const key of /** @type {const} */ (["split", "stereo"]))
+            buttonById("view-" + key).setAttribute("aria-pressed", String(this.modes[key]));
+        const { stage } = this;
+        const { classList } = document.body;
+        classList.toggle("surround-above", stage.paneAt(0, 0).view.kind === "endoscope");
+        classList.toggle("surround-below", stage.paneAt(0, innerHeight - 1).view.kind === "endoscope");
         if (!scope) return;
         buttonById("view-angled").setAttribute("aria-pressed", String(scope.pose.angle > 0));
         inputById("view-turn").disabled = scope.pose.angle === 0; // straight optics look the same however they turn

@@ -10,8 +10,10 @@ import { ViewPane } from "./view_pane.js";
 
 export class ViewModes {
     moving = 0; // from one view to another: the request of the next picture
-    split = false;
-    stereo = false;
+    split = false; // two views side by side
+    stereo = false; // a picture for each eye
+    /** @type {ViewPane[]} */
+    eyes = [];
 
     /**
      * @param {import("./stage.js").Stage} stage
@@ -23,6 +25,7 @@ export class ViewModes {
         this.pick = pick;
         this.changed = changed;
         /** @type {Side[]} */
+        stage.panes[0].stacks = true;
         this.sides = [{ pane: stage.panes[0], free: stage.free, scope: null }];
     }
 
@@ -50,8 +53,53 @@ export class ViewModes {
         }
         const view = kind === "free" ? side.free : side.scope;
         if (view) side.pane.view = view;
-        this.stage.setPanes(this.stage.panes);
+        this.arrange();
+    }
+
+    /** panes as the modes say */
+    arrange() {
+        const [left, right] = this.sides.map(({ pane }) => pane);
+        left.to = this.split ? 0.5 : 1;
+        for (const eye of this.eyes) eye.view = left.view;
+        this.stage.setPanes(this.stereo ? this.eyes : this.split ? [left, right] : [left]);
         this.changed();
+    }
+
+    /** the free view and the endoscope, side by side @param {boolean} on */
+    async setSplit(on) {
+        const [first, second] = this.sides;
+        if (on) {
+            this.stereo = false;
+            await this.show(first, "endoscope");
+            // the endoscope goes to the other side
+            const other = second ?? { pane: new ViewPane(first.pane.view, 0.5, 1, true), free: null, scope: null };
+            other.scope = first.scope;
+            first.scope = null;
+            this.sides = [first, other];
+            this.split = true;
+            await this.show(other, "endoscope");
+            await this.show(first, "free");
+        } else {
+            // what was worked in stays
+            const { kind } = this.stage.view;
+            const shot = this.shot();
+            first.scope ??= second.scope;
+            second.scope = first.scope === second.scope ? null : second.scope;
+            this.split = false;
+            await this.show(first, kind);
+            first.pane.view.restore(shot);
+        }
+    }
+
+    /** @param {boolean} on */
+    async setStereo(on) {
+        if (on && !this.eyes.length) {
+            const { stereoPanes } = await import("./stereo_view.js");
+            this.eyes = stereoPanes(this.sides[0].pane.view);
+        }
+        if (on && this.split) await this.setSplit(false);
+        this.stereo = on;
+        this.arrange();
     }
 
     /** @template {import("./view_pane.js").View} T @param {T} view */

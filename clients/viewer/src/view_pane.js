@@ -21,24 +21,34 @@
  *   the middle of the view, m; sees: is a pixel of the pane part of the picture; draw: with the lights of this view
  */
 
+const GAP = 2; // pixels between two views; the pictures of the eyes are of equal size
+
 export class ViewPane {
     /** @type {((camera: import("./three.js").PerspectiveCamera) => import("./three.js").PerspectiveCamera) | null} camera
      * of an eye, null: the view's own */
     lens = null;
 
-    /** @param {View} view @param {number} left @param {number} width shares of the canvas's width */
-    constructor(view, left = 0, width = 1) {
+    /**
+     * @param {View} view
+     * @param {number} from @param {number} to shares of the canvas, from left to right
+     * @param {boolean} stacks from top to bottom on a page that is higher than wide
+     */
+    constructor(view, from = 0, to = 1, stacks = false) {
         this.view = view;
-        this.left = left;
-        this.width = width;
+        this.from = from;
+        this.to = to;
+        this.stacks = stacks;
         this.camera = view.camera;
     }
 
-    /** on the canvas, pixels of the page @param {HTMLCanvasElement} canvas */
-    box(canvas) {
-        const width = canvas.clientWidth || 1;
-        const x = Math.round(this.left * width);
-        return { x, width: Math.round((this.left + this.width) * width) - x || 1, height: canvas.clientHeight || 1 };
+    /** on the canvas, pixels of the page @param {{clientWidth: number, clientHeight: number}} canvas */
+    box({ clientWidth, clientHeight }) {
+        const [width, height] = [clientWidth || 1, clientHeight || 1];
+        const stacked = this.stacks && height > width;
+        const [start, end] = [this.from, this.to].map((share) => Math.round(share * (stacked ? height : width)));
+        const begin = start && this.stacks ? start + GAP : start;
+        const extent = Math.max(1, end - begin);
+        return stacked ? { x: 0, y: begin, width, height: extent } : { x: begin, y: 0, width: extent, height };
     }
 
     /**
@@ -46,8 +56,10 @@ export class ViewPane {
      * @param {number} left @param {number} right @param {number} bottom margins of the canvas, pixels
      */
     fit(canvas, left, right, bottom) {
-        const { width, height } = this.box(canvas);
-        this.view.fit(width, height, this.left === 0 ? left : 0, this.left + this.width === 1 ? right : 0, bottom);
+        const { x, y, width, height } = this.box(canvas);
+        const atRight = x + width === (canvas.clientWidth || 1);
+        const atFoot = y + height === (canvas.clientHeight || 1);
+        this.view.fit(width, height, x === 0 ? left : 0, atRight ? right : 0, atFoot ? bottom : 0);
     }
 
     place() {
