@@ -309,14 +309,133 @@ async function stereo(page) {
     check("one picture again", await value(page, "stage.panes.length === 1 && stage.camera === stage.free.camera"));
 }
 
+/** an emulated headset with two controllers, for the pages that are loaded from now on */
+async function addHeadset(page) {
+    await page.addInitScript({ path: join(process.argv[2], "viewer_packages/node_modules/iwer/build/iwer.min.js") });
+    await page.addInitScript(() => {
+        window.headset = new window.IWER.XRDevice(window.IWER.metaQuest3);
+        window.headset.installRuntime({ forceInstall: true }); // in place of that of Chromium, which has no headset
+    });
+}
+
+/** moves the tip of a hand to a point of the scene, m */
+const moveHand = (page, side, point) =>
+    page.evaluate(
+        async ([side, point]) => {
+            const { views } = window.palpate;
+            const room = views.immersive.rig.worldToLocal(window.palpate.stage.centre.clone().fromArray(point));
+            const controller = window.headset.controllers[side];
+            controller.quaternion.set(0, 0, 0, 1);
+            controller.position.set(room.x, room.y, room.z + 0.1);
+            await new Promise(requestAnimationFrame);
+        },
+        [side, point],
+    );
+const button = (page, side, name, pressed) =>
+    page.evaluate(([s, n, p]) => window.headset.controllers[s].updateButtonValue(n, p), [side, name, Number(pressed)]);
+
+/** each hand pulls the organ at a point, and lets go */
+async function pullByHand(page, side, point, out) {
+    const before = await displacement(page);
+    await moveHand(page, side, point);
+    // a tool follows a jump of its hand at the speed of a hand
+    await until(() => value(page, "views.immersive.page.poses.every(({ behind }) => !behind)"));
+    await button(page, side, "trigger", true);
+    const grasped = () =>
+        value(page, "[state, views.immersive.second.state].filter((s) => s.ownToolState()?.grasps).length");
+    await until(grasped, (n) => n === 1);
+    for (let i = 1; i <= 10; i++)
+        await moveHand(
+            page,
+            side,
+            point.map((c, k) => c + 0.003 * i * out[k]),
+        );
+    const pulled = await until(
+        () => displacement(page),
+        (m) => m > before + 0.008,
+    );
+    check(
+        `the ${side} hand pulls the organ with its trigger`,
+        pulled > before + 0.008,
+        `${(1000 * pulled).toFixed(1)} mm`,
+    );
+    await page.screenshot({ path: join(pictures, `views_headset_${side}.png`) });
+    await button(page, side, "trigger", false);
+    const back = await until(
+        () => displacement(page),
+        (m) => m < before + 0.005,
+    );
+    check("and lets it go", back < before + 0.005, `${(1000 * back).toFixed(1)} mm`);
+    check("its tool with it", (await grasped()) === 0);
+}
+
+async function headset(page) {
+    const pixel = await organPixel(page);
+    const { point, out } = await page.evaluate(({ x, y }) => {
+        const hit = window.palpate.input.pick(window.palpate.stage.ray(x, y));
+        return { point: hit.point.toArray(), out: hit.normal.toArray() };
+    }, pixel);
+    await page.click("#view-toggle");
+    await page.click("#view-vr");
+    await until(() => value(page, "views.immersive?.place && stage.immersive !== null"));
+    check("a headset shows the scene", await value(page, "stage.renderer.xr.isPresenting"));
+    await until(() => value(page, "views.immersive.second.state.ownTool >= 0"));
+    const tools = await value(page, "[state.ownTool, views.immersive.second.state.ownTool]");
+    check("each hand has a tool", tools[0] >= 0 && tools[1] >= 0 && tools[0] !== tools[1], tools.join());
+    await until(() => value(page, "views.immersive.hands.every(({ source }) => source)"));
+    for (const side of ["right", "left"]) await pullByHand(page, side, point, out);
+
+    // both grips hold the scene: pulled apart it grows
+    const extent = () => value(page, "stage.size / views.immersive.place.scale");
+    const before = await extent();
+    const centre = await value(page, "stage.centre.toArray()");
+    const apart = (d) =>
+        page.evaluate((d) => {
+            for (const [side, sign] of [
+                ["left", -1],
+                ["right", 1],
+            ])
+                window.headset.controllers[side].position.set(sign * d, 1.2, -0.4);
+        }, d);
+    const twoFrames = () =>
+        page.evaluate(() => new Promise((r) => requestAnimationFrame(() => requestAnimationFrame(r))));
+    await apart(0.2);
+    for (const side of ["left", "right"]) await button(page, side, "squeeze", true);
+    await until(() => value(page, "views.immersive.held.length === 2"));
+    await twoFrames();
+    await apart(0.3);
+    const grown = await until(extent, (e) => e > before * 1.4);
+    check("two grips pulled apart enlarge the scene", Math.abs(grown / before - 1.5) < 0.01, `${before} ${grown} m`);
+    check("and lift the tools", await value(page, "state.target === null"));
+    for (const side of ["left", "right"]) await button(page, side, "squeeze", false);
+    check("the scene itself stays where it is", (await value(page, "stage.centre.toArray()")).join() === centre.join());
+
+    await page.evaluate(() => window.palpate.stage.renderer.xr.getSession().end());
+    await until(() => value(page, "stage.immersive === null && views.immersive === null"));
+    await until(() => value(page, "state.members.size === 1"));
+    check("after the session the second hand is gone", await value(page, "state.members.size === 1"));
+    // the emulator puts the canvas back above all else
+    await page.evaluate(() => document.body.prepend(window.palpate.stage.canvas));
+    await until(
+        () => displacement(page),
+        (m) => m < 0.002,
+    );
+    await picture(page, "views_after_headset");
+    const error = await pickingError(page, await organPixel(page));
+    check("and the page draws and picks as before", error < 0.5, `${error.toFixed(3)} px`);
+}
+
 await run(async () => {
     const server = await serve(prepare(), 0);
     const browser = await launch();
     const page = await open(browser, `http://127.0.0.1:${server.info.port}/`, "Ada", { width: 1280, height: 800 });
     await settled(page, () => 0.0005, 1);
+    check("without a headset none is offered", await page.locator("#view-vr").isHidden());
+    await addHeadset(page);
     await endoscope(page);
     await savedViews(page);
     await splitView(page);
     await stereo(page);
+    await headset(page);
     checkConsoles();
 });

@@ -50,6 +50,7 @@ const bodies = new BodySet(state, stage, (part, { positions, normals }) =>
     post({ type: "reuse", part, positions, normals }, [positions.buffer, normals.buffer]),
 );
 const poses = new PoseSender(state, post, () => stage.size);
+const ownPoses = [poses]; // of both hands in a headset
 const fields = new FieldDisplay(state, stage, send, layout);
 const marks = new ToolMarks(stage, htmlById("labels"));
 const panel = new PlanPanel(document, sendCommand);
@@ -78,6 +79,12 @@ const views = new ViewModes(
     () => {},
 );
 const viewMenu = new ViewMenu(state, stage, views);
+viewMenu.offerHeadset(() => {
+    input.release();
+    const { name, ...rest } = joinOptions();
+    const second = { ...rest, name: text("views.second_hand", { name }) };
+    return { state, stage, poses: ownPoses, second, picture };
+});
 const showFigures = () => messages.showFigures();
 const controls = new Controls({ state, stage, layout, input, fields, accuracy, sculpt, viewMenu, send, showFigures });
 const panels = { panel, members, accuracy, sculpt, playback, others, controls };
@@ -116,8 +123,13 @@ let toldSlow = false; // that this browser draws slowly: once
 let countedAt = performance.now();
 function draw() {
     requestAnimationFrame(draw);
+    if (stage.immersive) return; // the headset asks for its pictures
     input.tick();
     poses.send(false);
+    picture();
+}
+
+function picture() {
     const now = performance.now();
     if (stage.ready()) {
         marks.depth = pressDepth(input.drag, state.ownToolState());
@@ -131,7 +143,10 @@ function draw() {
             const own = state.plays ? -1 : state.ownTool;
             marks.drawn = state.tools;
             marks.update(
-                withOwnTool(others.draw(now), own, poses.last),
+                ownPoses.reduce(
+                    (tools, { state: hand, last }) => withOwnTool(tools, state.plays ? -1 : hand.ownTool, last),
+                    others.draw(now),
+                ),
                 (id, tool) =>
                     state.members.get(id)?.name ?? (state.plays ? (state.hello?.tools[tool]?.name ?? "") : ""),
                 own,
@@ -160,15 +175,18 @@ function draw() {
     }
 }
 
-function connect() {
+/** of the join of this page @returns {import("./link.js").Wishes} */
+function joinOptions() {
     const query = new URLSearchParams(location.search);
     const session = query.get("session");
     const scheme = location.protocol === "https:" ? "wss" : "ws";
     const url = `${scheme}://${location.host}/ws${session ? "?session=" + encodeURIComponent(session) : ""}`;
     // with a ticket: whatever it allows
     const role = ROLES.find((known) => known === query.get("role")) ?? (ticket ? "instructor" : "trainee");
-    post({ type: "connect", url, name: inputById("name").value.trim() || text("people.guest"), role, ticket });
+    return { url, name: inputById("name").value.trim() || text("people.guest"), role, ticket };
 }
+
+const connect = () => post({ type: "connect", ...joinOptions() });
 
 htmlById("lobby-link").hidden = !new URLSearchParams(location.search).has("session");
 inputById("name").value =

@@ -86,6 +86,8 @@ export class Stage {
         this.scene.add(this.key, this.rim, this.fill, new THREE.HemisphereLight(0xdfe9f2, 0x4a332b, 1.15));
         this.scene.environment = makeStudio(this.renderer);
         this.scene.environmentIntensity = 0.8;
+        /** @type {{draw: () => void} | null} what draws for a headset, at its pace */
+        this.immersive = null;
         this.left = this.right = this.bottom = 0; // margins that panels cover, pixels
         this.dirty = true;
         const ratio = Math.min(window.devicePixelRatio || 1, 2);
@@ -238,7 +240,7 @@ export class Stage {
 
     /** is the last picture finished, and its pause over? */
     ready() {
-        return this.pace.ready(performance.now());
+        return this.immersive !== null || this.pace.ready(performance.now());
     }
 
     /** a canvas that gets another size is blank until it is drawn, so both happen in one turn */
@@ -272,6 +274,7 @@ export class Stage {
     draw() {
         if (!this.dirty) return;
         this.dirty = false;
+        if (this.immersive) return this.immersive.draw();
         this.applySize();
         this.placeCameras();
         this.pace.begin(performance.now());

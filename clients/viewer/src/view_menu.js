@@ -58,6 +58,21 @@ export class ViewMenu {
         modes.changed = () => this.show();
     }
 
+    /** where the browser has a headset @param {() => import("./xr_view.js").XrPage} page */
+    async offerHeadset(page) {
+        const button = buttonById("view-vr");
+        button.hidden = !(await navigator.xr?.isSessionSupported("immersive-vr").catch(() => false));
+        button.onclick = async () => {
+            this.open(false);
+            try {
+                const { XrView } = await import("./xr_view.js");
+                this.modes.immersive = await XrView.start(page(), () => (this.modes.immersive = null));
+            } catch (error) {
+                this.hint(text("views.vr.refused", { reason: String(error) }));
+            }
+        };
+    }
+
     /** @param {boolean} opened */
     open(opened) {
         if (opened === !this.menu.hidden) return;

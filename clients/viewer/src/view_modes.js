@@ -12,6 +12,8 @@ export class ViewModes {
     moving = 0; // from one view to another: the request of the next picture
     split = false; // two views side by side
     stereo = false; // a picture for each eye
+    /** @type {import("./xr_view.js").XrView | null} in a headset */
+    immersive = null;
     /** @type {ViewPane[]} */
     eyes = [];
 
