@@ -51,7 +51,7 @@ export class ToolInput {
         });
     }
 
-    /** what is under the pointer @param {MouseEvent} e */
+    /** what is under a point of the page @param {{clientX: number, clientY: number}} e */
     hit(e) {
         const { stage } = this;
         return stage.sees(e.clientX, e.clientY) ? this.pick(stage.ray(e.clientX, e.clientY)) : null;

@@ -2,6 +2,7 @@
 import { buttonById, byId, htmlById, inputById } from "./dom.js";
 import { nextName, readViews, withView } from "./saved_views.js";
 import { STANDARD } from "./standard_views.js";
+import { store, stored } from "./storage.js";
 import { text } from "./text.js";
 
 /** @param {string} textContent */
@@ -14,8 +15,7 @@ const DEGREE = Math.PI / 180;
 export class ViewMenu {
     explained = false; // how an endoscope is moved
     hintTimer = 0;
-    /** @type {import("./saved_views.js").Saved[]} */
-    unstored = [];
+    unstored = "[]"; // saved views where the browser stores nothing
 
     /**
      * @param {import("./app_state.js").AppState} state @param {import("./stage.js").Stage} stage
@@ -132,21 +132,13 @@ export class ViewMenu {
 
     /** without storage they last as long as the page @returns {import("./saved_views.js").Saved[]} */
     saved() {
-        try {
-            return readViews(localStorage.getItem(this.storage));
-        } catch {
-            return this.unstored;
-        }
+        return readViews(stored(this.storage) ?? this.unstored);
     }
 
     /** @param {import("./saved_views.js").Saved[]} views */
-    store(views) {
-        this.unstored = views;
-        try {
-            localStorage.setItem(this.storage, JSON.stringify(views));
-        } catch {
-            // as saved() says
-        }
+    keep(views) {
+        this.unstored = JSON.stringify(views);
+        store(this.storage, this.unstored);
         this.showSaved();
     }
 
@@ -154,7 +146,7 @@ export class ViewMenu {
     save(wanted = "") {
         const views = this.saved();
         const name = wanted || nextName(views, named);
-        this.store(withView(views, name, this.modes.shot()));
+        this.keep(withView(views, name, this.modes.shot()));
         inputById("view-name").value = "";
         this.hint(text("views.saved.done", { name }));
     }
@@ -176,7 +168,7 @@ export class ViewMenu {
                 const remove = makeButton("×");
                 remove.ariaLabel = remove.title = text("views.delete", { name });
                 remove.onclick = () => {
-                    this.store(this.saved().filter((view) => view.name !== name));
+                    this.keep(this.saved().filter((view) => view.name !== name));
                     inputById("view-name").focus();
                 };
                 const [item, row] = [document.createElement("li"), document.createElement("div")];
