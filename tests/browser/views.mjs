@@ -66,7 +66,7 @@ const pickingError = (page, pixel) =>
     }, pixel);
 
 /** pulls at a pixel until the organ follows, and lets go @returns how far it was pulled, m */
-async function pull(page, pixel) {
+async function pull(page, pixel, name) {
     const before = await displacement(page);
     await page.mouse.move(pixel.x, pixel.y);
     await page.mouse.down();
@@ -76,6 +76,7 @@ async function pull(page, pixel) {
         () => displacement(page),
         (m) => m > before + 0.008,
     );
+    if (name) await picture(page, name);
     await page.mouse.up();
     await until(
         () => displacement(page),
@@ -99,7 +100,7 @@ async function endoscope(page) {
     const pixel = await organPixel(page);
     const error = await pickingError(page, pixel);
     check("a ray through a pixel of it meets what is drawn there", error < 0.5, `${error.toFixed(3)} px`);
-    const pulled = await pull(page, pixel);
+    const pulled = await pull(page, pixel, "views_endoscope_pull");
     check("the organ can be pulled in it", pulled > 0.008, `${(1000 * pulled).toFixed(1)} mm`);
 
     const yaw = await value(page, "views.scope.pose.yaw");
@@ -337,9 +338,15 @@ const button = (page, side, name, pressed) =>
 /** each hand pulls the organ at a point, and lets go */
 async function pullByHand(page, side, point, out) {
     const before = await displacement(page);
-    await moveHand(page, side, point);
-    // a tool follows a jump of its hand at the speed of a hand
-    await until(() => value(page, "views.immersive.page.poses.every(({ behind }) => !behind)"));
+    // from outside, and no faster than the tool can follow
+    for (const far of [0.1, 0]) {
+        await moveHand(
+            page,
+            side,
+            point.map((c, k) => c + far * out[k]),
+        );
+        await until(() => value(page, "views.immersive.page.poses.every(({ behind }) => !behind)"));
+    }
     await button(page, side, "trigger", true);
     const grasped = () =>
         value(page, "[state, views.immersive.second.state].filter((s) => s.ownToolState()?.grasps).length");

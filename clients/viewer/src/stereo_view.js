@@ -16,6 +16,7 @@ export function stereoPanes(view) {
             stereo.update(camera);
             eye.projectionMatrixInverse.copy(eye.projectionMatrix).invert();
             eye.updateMatrixWorld();
+            eye.matrixWorld.decompose(eye.position, eye.quaternion, eye.scale);
             return Object.assign(eye, { fov: camera.fov, zoom: camera.zoom });
         };
         return pane;

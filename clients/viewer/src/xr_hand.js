@@ -1,4 +1,5 @@
 // A hand in a headset: a controller or a tracked hand, the rod it holds, and what its fingers do.
+import { handAt } from "./instrument_pose.js";
 import * as THREE from "./three.js";
 
 const ROD_M = 0.1; // from the controller to the tip of its tool
@@ -57,8 +58,12 @@ export class XrHand {
     /** where its tool is to be; null: away, because the hand is absent or holds the scene */
     target() {
         if (!this.source || this.squeezes || !this.space.visible) return null;
-        const at = this.tip.clone().applyMatrix4(this.space.matrixWorld);
-        return { position: at.toArray(), grasp: this.trigger };
+        const { matrixWorld } = this.space;
+        const position = this.tip.clone().applyMatrix4(matrixWorld).toArray();
+        // an instrument lies in the hand as the controller does
+        const [from, up] = [new THREE.Vector3().setFromMatrixPosition(matrixWorld), new THREE.Vector3()];
+        up.setFromMatrixColumn(matrixWorld, 1).normalize();
+        return { position, grasp: this.trigger, hand: handAt(from.toArray(), position, up.toArray()) };
     }
 
     /** the controller shakes with the force on its tool @param {number} force N @param {number} cap N */
