@@ -140,6 +140,7 @@ if [ -z "$fast" ]; then
     step "viewer, trainee and instructor in the browser" sh "$tree/tests/browser/run.sh" rights "$build"
     step "sessions opened and ended in the browser" sh "$tree/tests/browser/run.sh" lobby "$build"
     step "time plots in the browser" sh "$tree/tests/browser/run.sh" plots "$build"
+    step "endoscope, saved views, two views, stereo and a headset" sh "$tree/tests/browser/run.sh" views "$build"
     step "a recording in the browser" sh "$tree/tests/browser/run.sh" debrief "$build"
     step "keyboard, languages and telephones in the browser" sh "$tree/tests/browser/run.sh" access "$build"
     step "two browsers, a bridge and lcm-logger together" sh "$tree/tests/browser/run.sh" together "$build"

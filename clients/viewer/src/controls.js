@@ -15,6 +15,7 @@ const ROLL_RAD = Math.PI / 12; // turn of the instrument for a key press
  *   input: import("./tool_input.js").ToolInput, fields: import("./field_display.js").FieldDisplay,
  *   accuracy: import("./accuracy_panel.js").AccuracyPanel, plots: import("./plots.js").Plots,
  *   sculpt: import("./sculpt_panel.js").SculptPanel,
+ *   viewMenu: import("./view_menu.js").ViewMenu,
  *   send: (message: import("./control_table.js").ClientMessage) => void, showFigures: () => void
  * }} Page the parts of the page that the controls act on
  */
@@ -39,7 +40,7 @@ export class Controls {
     }
 
     addKeys() {
-        const { accuracy, fields, input, layout, plots, sculpt, stage } = this.page;
+        const { accuracy, fields, input, layout, plots, sculpt, stage, viewMenu } = this.page;
         const keyboard = new KeyboardTool(stage, input, () => {
             htmlById("hint").classList.add("gone");
             layout.notice(text("hint.keys"), KEYS_MS);
@@ -58,6 +59,8 @@ export class Controls {
                 m: () => this.toggleMesh(),
                 q: () => input.roll(-ROLL_RAD),
                 w: () => input.roll(ROLL_RAD),
+                e: () => viewMenu.toggleEndoscope(),
+                v: () => viewMenu.save(),
                 "?": () => this.openHelp(),
                 f1: () => this.openHelp(),
                 escape: () => this.closePanels(),
@@ -67,7 +70,8 @@ export class Controls {
         window.addEventListener("keydown", (e) => {
             // an open dialog has the keyboard; it closes with Escape by itself
             if (byId("help", HTMLDialogElement).open) return;
-            const action = keyboard.key(e) || sculpt.key(e) ? () => {} : actionOf(e);
+            const handled = keyboard.key(e) || sculpt.key(e) || viewMenu.goByKey(e);
+            const action = handled ? () => {} : actionOf(e);
             if (!action) return;
             e.preventDefault();
             action();

@@ -60,8 +60,8 @@ const FINAL = new Map([
  */
 /**
  * Messages from the page to the worker.
- * @typedef {{url: string, name: string, role: import("./control_table.js").Role, ticket: string}} Wishes of a join; a
- *   ticket of "": none
+ * @typedef {{url: string, name: string, role: import("./control_table.js").Role, ticket: string, toolOnly?: boolean}} Wishes
+ *   of a join; a ticket of "": none; toolOnly: nothing of the scene but its tools is taken
  * @typedef {({type: "connect"} & Wishes)
  *   | ({type: "pose"} & ToolPose)
  *   | {type: "control", message: ClientMessage}
@@ -169,7 +169,7 @@ export class Link {
                 name: this.options.name,
                 role: this.options.role,
                 tool: this.options.role === "viewer" ? null : -1,
-                topology_deltas: true,
+                topology_deltas: !this.options.toolOnly,
             });
         };
         socket.onmessage = (event) => {
@@ -274,6 +274,7 @@ export class Link {
         const bytes = new Uint8Array(data);
         this.bytes += bytes.length;
         const head = readHead(bytes);
+        if (this.options.toolOnly && head.kind !== KIND.TOOLS) return;
         if (head.kind === KIND.FRAME) this.frame(head.index, bytes);
         else if (head.kind === KIND.TOOLS) this.tools(bytes);
         else if (head.kind === KIND.FIELD) this.field(head.index, bytes);
@@ -315,6 +316,7 @@ export class Link {
 
     /** @param {number} index @param {{epoch: number, asset: string}} info */
     async loadPart(index, info) {
+        if (this.options.toolOnly) return;
         if (this.requested.get(index) === info.epoch) return;
         this.requested.set(index, info.epoch);
         const generation = this.generation;

@@ -30,6 +30,8 @@ import { language, text } from "./text.js";
 import { takeTicket } from "./ticket.js";
 import { ToolInput } from "./tool_input.js";
 import { ToolMarks } from "./tool_marks.js";
+import { ViewMenu } from "./view_menu.js";
+import { ViewModes } from "./view_modes.js";
 
 const FORCE_MIN_N = 0.005; // a smaller force is displayed as 0.00
 const SLOW_NOTICE_MS = 12000;
@@ -52,6 +54,7 @@ const bodies = new BodySet(state, stage, (part, { positions, normals }) =>
     post({ type: "reuse", part, positions, normals }, [positions.buffer, normals.buffer]),
 );
 const poses = new PoseSender(state, post, () => stage.size);
+const ownPoses = [poses]; // of both hands in a headset
 const fields = new FieldDisplay(state, stage, send, layout);
 const marks = new ToolMarks(stage, htmlById("labels"));
 const panel = new PlanPanel(document, sendCommand);
@@ -77,8 +80,21 @@ const input = new ToolInput(
 );
 input.onClick = (/** @type {number[]} */ position) => sculpt.click(position);
 input.onFirstDrag = () => htmlById("hint").classList.add("gone");
+const views = new ViewModes(
+    stage,
+    (ray) => bodies.pick(ray),
+    () => {},
+);
+const viewMenu = new ViewMenu(state, stage, views);
+viewMenu.offerHeadset(() => {
+    input.release();
+    const { name, ...rest } = joinOptions();
+    const second = { ...rest, name: text("views.second_hand", { name }) };
+    return { state, stage, poses: ownPoses, second, picture };
+});
 const showFigures = () => messages.showFigures();
-const controls = new Controls({ state, stage, layout, input, fields, accuracy, plots, sculpt, send, showFigures });
+const tools = { accuracy, plots, sculpt, viewMenu };
+const controls = new Controls({ state, stage, layout, input, fields, ...tools, send, showFigures });
 const panels = { panel, members, accuracy, plots, sculpt, playback, others, controls };
 const messages = new Messages({ state, stage, layout, bodies, fields, input, marks, send, ...panels });
 worker.onmessage = (/** @type {MessageEvent<import("./link.js").PageMessage>} */ { data }) => messages.take(data);
@@ -112,8 +128,13 @@ let toldSlow = false; // that this browser draws slowly: once
 let countedAt = performance.now();
 function draw() {
     requestAnimationFrame(draw);
+    if (stage.immersive) return; // the headset asks for its pictures
     input.tick();
     poses.send(false);
+    picture();
+}
+
+function picture() {
     const now = performance.now();
     if (stage.ready()) {
         marks.depth = pressDepth(input.drag, state.ownToolState());
@@ -128,7 +149,10 @@ function draw() {
             const own = state.plays ? -1 : state.ownTool;
             marks.drawn = state.tools;
             marks.update(
-                withOwnTool(others.draw(now), own, poses.last),
+                ownPoses.reduce(
+                    (tools, { state: hand, last }) => withOwnTool(tools, state.plays ? -1 : hand.ownTool, last),
+                    others.draw(now),
+                ),
                 (id, tool) =>
                     state.members.get(id)?.name ?? (state.plays ? (state.hello?.tools[tool]?.name ?? "") : ""),
                 own,
@@ -158,15 +182,18 @@ function draw() {
     }
 }
 
-function connect() {
+/** of the join of this page @returns {import("./link.js").Wishes} */
+function joinOptions() {
     const query = new URLSearchParams(location.search);
     const session = query.get("session");
     const scheme = location.protocol === "https:" ? "wss" : "ws";
     const url = `${scheme}://${location.host}/ws${session ? "?session=" + encodeURIComponent(session) : ""}`;
     // with a ticket: whatever it allows
     const role = ROLES.find((known) => known === query.get("role")) ?? (ticket ? "instructor" : "trainee");
-    post({ type: "connect", url, name: inputById("name").value.trim() || text("people.guest"), role, ticket });
+    return { url, name: inputById("name").value.trim() || text("people.guest"), role, ticket };
 }
+
+const connect = () => post({ type: "connect", ...joinOptions() });
 
 htmlById("lobby-link").hidden = !new URLSearchParams(location.search).has("session");
 inputById("name").value =
@@ -176,6 +203,7 @@ inputById("name").onchange = () => {
     connect();
 };
 // read-only access for tests and for the console
-Object.defineProperty(window, "palpate", { value: { state, stage, input, marks, accuracy, plots, capture, cue } });
+const shown = { state, stage, input, marks, accuracy, plots, capture, cue, views };
+Object.defineProperty(window, "palpate", { value: shown });
 connect();
 draw();
