@@ -1,6 +1,7 @@
 #!/bin/sh
-# The browser tests: real Chromium on a real server. usage: run.sh pull|fields|calibrated|adaptive|sculpt|accuracy|rights|debrief|lobby|access|plots|together BUILD [PICTURES]
+# The browser tests: real Chromium on a real server. usage: run.sh pull|textured|fields|calibrated|adaptive|sculpt|accuracy|rights|debrief|lobby|access|plots|together BUILD [PICTURES]
 #   pull      two browsers share an organ that one of them pulls
+#   textured  the image of an OBJ file on its surface
 #   fields    displacement, stress, energy and edge stiffness in colours
 #   calibrated  a calibrated scene and its error
 #   adaptive  an adaptive surface that is refined under the tool
@@ -18,13 +19,13 @@ which=${1:-pull}
 build=$(cd "${2:-$here/../../build}" && pwd) || exit 2
 pictures=${3:-$build/pictures}
 case $which in
-pull | fields | calibrated | adaptive | sculpt | accuracy | rights | debrief | lobby | access | plots) exec node "$here/$which.mjs" "$build" "$pictures" ${4-} ;;
+pull | textured | fields | calibrated | adaptive | sculpt | accuracy | rights | debrief | lobby | access | plots) exec node "$here/$which.mjs" "$build" "$pictures" ${4-} ;;
 together)
     exec unshare -n sh -c 'ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo && exec node "$0/together.mjs" "$1" "$2"' \
         "$here" "$build" "$pictures"
     ;;
 *)
-    echo "usage: run.sh pull|fields|calibrated|adaptive|sculpt|accuracy|rights|debrief|lobby|access|plots|together BUILD [PICTURES]" >&2
+    echo "usage: run.sh pull|textured|fields|calibrated|adaptive|sculpt|accuracy|rights|debrief|lobby|access|plots|together BUILD [PICTURES]" >&2
     exit 2
     ;;
 esac
