@@ -132,6 +132,7 @@ step "viewer: types" sh "$tree/tests/house/check_viewer.sh" types "$build"
 step "viewer: node tests" sh "$tree/tests/house/check_viewer.sh" test "$build"
 if [ -z "$fast" ]; then
     step "two browsers share an organ" sh "$tree/tests/browser/run.sh" pull "$build"
+    step "an image on a surface" sh "$tree/tests/browser/run.sh" textured "$build"
     step "fields in colours" sh "$tree/tests/browser/run.sh" fields "$build"
     step "a calibrated scene in the browser" sh "$tree/tests/browser/run.sh" calibrated "$build"
     step "an adaptive surface in the browser" sh "$tree/tests/browser/run.sh" adaptive "$build"

@@ -1,6 +1,7 @@
 #!/bin/sh
 # The browser tests: real Chromium on a real server. usage: run.sh NAME BUILD [PICTURES], NAME being
 #   pull      two browsers share an organ that one of them pulls
+#   textured  the image of an OBJ file on its surface
 #   fields    displacement, stress, energy and edge stiffness in colours
 #   calibrated  a calibrated scene and its error
 #   adaptive  an adaptive surface that is refined under the tool

@@ -116,6 +116,10 @@ typedef struct pal_tool_def {
     double trocar_m[3]; /* the point that the shaft passes; for clients, the simulation takes any pose */
 } pal_tool_def;
 
+/* s: limits of step_s */
+#define PAL_STEP_MIN_S 1e-4
+#define PAL_STEP_MAX_S 0.1
+
 typedef struct pal_scene {
     char name[PAL_NAME]; /* session name, [a-z0-9_-]                                  */
     char title[128];     /* shown to people: "Liver, abdominal CT"                    */
