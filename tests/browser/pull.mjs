@@ -196,6 +196,18 @@ await run(async () => {
     check("its tip is at the tool", closed.apart < 1e-4, `${(1e6 * closed.apart).toFixed(0)} um`);
     const covered = await coverage(ben, holders[0]);
     check("and is drawn", covered > 0.002 && covered < 0.2, `${(100 * covered).toFixed(2)} % of the picture`);
+    const roll = (page) =>
+        page.evaluate((index) => window.palpate.marks.marks[index].instrument.group.quaternion.toArray(), holders[0]);
+    const straight = await roll(ben);
+    for (let k = 0; k < 3; k++) await ada.keyboard.press("w");
+    // three turns of 15 degrees; the shaft stays where it is
+    const turn = (a, b) =>
+        (2 * Math.acos(Math.min(1, Math.abs(a.reduce((s, v, k) => s + v * b[k], 0)))) * 180) / Math.PI;
+    const turned = await until(
+        async () => turn(await roll(ben), straight),
+        (angle) => Math.abs(angle - 45) < 1,
+    );
+    check("it turns about its shaft by keys", Math.abs(turned - 45) < 1, `${turned.toFixed(1)} degrees`);
     const behind = await hideTip(ben, holders[0]);
     const through = behind ? await coverage(ben, holders[0], behind) : 0;
     check("also through the tissue that hides its tip", through > 0.05, `${(100 * through).toFixed(0)} % there`);
