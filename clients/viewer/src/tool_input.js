@@ -179,9 +179,11 @@ export class ToolInput {
 
     /** turns the instrument about its shaft @param {number} angle rad */
     roll(angle) {
-        if (!this.drag?.hand) return;
-        this.drag.hand = { ...this.drag.hand, roll: this.drag.hand.roll + angle };
-        this.tick();
+        const held = this.drag ?? this.held;
+        if (!held?.hand) return;
+        held.hand = { ...held.hand, roll: held.hand.roll + angle };
+        if (this.drag) this.tick();
+        else if (this.held) this.hold(this.held);
     }
 
     /** updates the target; also called while the pointer rests, because a press deepens over time */
