@@ -38,13 +38,19 @@ function makeStudio(renderer) {
     };
     const room = new THREE.Mesh(
         new THREE.SphereGeometry(10, 24, 16),
-        new THREE.MeshBasicMaterial({ color: 0x20272e, side: THREE.BackSide }),
+        new THREE.MeshBasicMaterial({ color: 0x2a2725, side: THREE.BackSide }),
     );
     studio.add(room);
-    panel(9, "#fff4e6", [0, 2, 7], [6, 4, 0.2]); // above
-    panel(5, "#dcebff", [-7, 0, 2], [0.2, 4, 5]); // cool side
-    panel(3, "#ffe2c4", [7, -2, 1], [0.2, 3, 3]); // warm side
-    panel(0.6, "#8fa3b5", [0, 0, -7], [9, 9, 0.2]); // light from below, weak
+    // lamps above, small and bright as in an operating room: their reflections in wet tissue are spots, not patches
+    for (const [x, y] of [
+        [-2.4, 1],
+        [0, -2.2],
+        [2.4, 1],
+    ])
+        panel(26, "#fff6ea", [x, y, 7], [1.3, 1.3, 0.2]);
+    panel(0.9, "#fff4ea", [-7, 0, 2], [0.2, 7, 7]);
+    panel(0.7, "#fff2e6", [7, -2, 1], [0.2, 6, 6]);
+    panel(0.35, "#c9b7ab", [0, 0, -7], [9, 9, 0.2]); // light from below, weak
     const generator = new THREE.PMREMGenerator(renderer);
     const texture = generator.fromScene(studio, 0.035).texture;
     generator.dispose();
@@ -63,8 +69,8 @@ export class Stage {
         this.canvas = canvas;
         const software = isSoftwareRenderer();
         this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !software, powerPreference: "high-performance" });
-        this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
-        this.renderer.toneMappingExposure = 1.0;
+        this.renderer.toneMapping = THREE.NeutralToneMapping;
+        this.renderer.toneMappingExposure = 1.12;
         this.scene = new THREE.Scene();
         const light = window.matchMedia("(prefers-color-scheme: light)");
         this.scene.background = makeBackdrop(light.matches);
@@ -80,7 +86,7 @@ export class Stage {
         this.elevation = 0.42;
         this.size = 0.3; // diagonal of the scene, m
         this.key = new THREE.DirectionalLight(0xfff2e2, 1.9);
-        this.rim = new THREE.DirectionalLight(0xbfd8ff, 1.1);
+        this.rim = new THREE.DirectionalLight(0xfff1e6, 1.0);
         this.fill = new THREE.DirectionalLight(0xffe9dc, 0.85); // from the camera and below: no visible side is black
         this.scene.add(this.key, this.rim, this.fill, new THREE.HemisphereLight(0xdfe9f2, 0x4a332b, 1.15));
         this.scene.environment = makeStudio(this.renderer);

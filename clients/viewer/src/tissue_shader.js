@@ -35,8 +35,9 @@ function volume({ data, size, slope }) {
 }
 
 function allPatterns() {
+    if (patterns) return patterns;
     const vessels = drawVessels(growVessels(VESSELS.places, VESSELS.roots), VESSELS.size);
-    patterns ??= {
+    patterns = {
         noise: volume(makeNoise(NOISE.size, NOISE.cells)),
         cells: volume(makeCells(CELLS.size, CELLS.cells)),
         vessels: {

@@ -37,9 +37,11 @@ test("unknown words and colours fall back", () => {
 });
 
 test("a colour of its own replaces the appearance's and shifts the others with it", () => {
-    const look = lookOf("liver", "#7E3A30"); // 16 above in every channel
-    assert.equal(look.colour, "#7E3A30");
-    assert.equal(look.tone, "#5d2a27");
+    const { colour, tone } = LOOKS.liver;
+    const moved = (/** @type {string} */ c) => `#${(parseInt(c.slice(1), 16) + 0x101010).toString(16)}`;
+    const look = lookOf("liver", moved(colour).toUpperCase());
+    assert.equal(look.colour, moved(colour).toUpperCase());
+    assert.equal(look.tone, moved(tone));
     assert.equal(look.cells, LOOKS.liver.cells);
     assert.equal(lookOf("plastic", "#000000").inner, "#000000");
 });
