@@ -1,5 +1,5 @@
 #!/bin/sh
-# The browser tests: real Chromium on a real server. usage: run.sh pull|fields|calibrated|adaptive|sculpt|accuracy|rights|debrief|lobby|access|plots|together BUILD [PICTURES]
+# The browser tests: real Chromium on a real server. usage: run.sh pull|fields|calibrated|adaptive|sculpt|accuracy|rights|debrief|lobby|access|plots|look|effects|together BUILD [PICTURES]
 #   pull      two browsers share an organ that one of them pulls
 #   fields    displacement, stress, energy and edge stiffness in colours
 #   calibrated  a calibrated scene and its error
@@ -10,6 +10,8 @@
 #   debrief   a recording that is played, sought, and gone on from live
 #   lobby     sessions of a server, opened and ended by an instructor
 #   access    keyboard, screen readers, other languages, telephones
+#   look      a look for each organ, patterns that stick to tissue, shadows and occlusion
+#   effects   no test: prints what each visual feature costs a picture
 #   together  two browsers, a haptic bridge and lcm-logger on one organ; in a network namespace of its own
 # BUILD is the folder of deploy/test.sh (release/bin/palpate, viewer_packages); PICTURES keeps the screenshots.
 set -u
@@ -18,13 +20,13 @@ which=${1:-pull}
 build=$(cd "${2:-$here/../../build}" && pwd) || exit 2
 pictures=${3:-$build/pictures}
 case $which in
-pull | fields | calibrated | adaptive | sculpt | accuracy | rights | debrief | lobby | access | plots) exec node "$here/$which.mjs" "$build" "$pictures" ${4-} ;;
+pull | fields | calibrated | adaptive | sculpt | accuracy | rights | debrief | lobby | access | plots | look | effects) exec node "$here/$which.mjs" "$build" "$pictures" ${4-} ;;
 together)
     exec unshare -n sh -c 'ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo && exec node "$0/together.mjs" "$1" "$2"' \
         "$here" "$build" "$pictures"
     ;;
 *)
-    echo "usage: run.sh pull|fields|calibrated|adaptive|sculpt|accuracy|rights|debrief|lobby|access|plots|together BUILD [PICTURES]" >&2
+    echo "usage: run.sh pull|fields|calibrated|adaptive|sculpt|accuracy|rights|debrief|lobby|access|plots|look|effects|together BUILD [PICTURES]" >&2
     exit 2
     ;;
 esac

@@ -1,6 +1,7 @@
 // The stage: renderer, light, camera and its orbit. Lengths are metres of the scene frame; `up` is the scene's.
 import { makeBackdrop } from "./backdrop.js";
 import { Pace } from "./pace.js";
+import { makeEffects } from "./picture_effects.js";
 import * as THREE from "./three.js";
 
 const RATIO_MIN = 0.4; // drawn pixels per page pixel, where drawing is slow
@@ -70,7 +71,7 @@ export class Stage {
         const software = isSoftwareRenderer();
         this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !software, powerPreference: "high-performance" });
         this.renderer.toneMapping = THREE.NeutralToneMapping;
-        this.renderer.toneMappingExposure = 1.12;
+        this.renderer.toneMappingExposure = 1.05;
         this.scene = new THREE.Scene();
         const light = window.matchMedia("(prefers-color-scheme: light)");
         this.scene.background = makeBackdrop(light.matches);
@@ -85,16 +86,18 @@ export class Stage {
         this.azimuth = -0.6; // around up, rad
         this.elevation = 0.42;
         this.size = 0.3; // diagonal of the scene, m
-        this.key = new THREE.DirectionalLight(0xfff2e2, 1.9);
+        this.middle = new THREE.Vector3(); // of the scene
+        this.key = new THREE.DirectionalLight(0xfff5ea, 2.6);
         this.rim = new THREE.DirectionalLight(0xfff1e6, 1.0);
-        this.fill = new THREE.DirectionalLight(0xffe9dc, 0.85); // from the camera and below: no visible side is black
-        this.scene.add(this.key, this.rim, this.fill, new THREE.HemisphereLight(0xdfe9f2, 0x4a332b, 1.15));
+        this.fill = new THREE.DirectionalLight(0xfff0e8, 0.6); // from the camera and below: no visible side is black
+        this.scene.add(this.key, this.rim, this.fill, new THREE.HemisphereLight(0xe9eaec, 0x3f3430, 0.85));
         this.scene.environment = makeStudio(this.renderer);
-        this.scene.environmentIntensity = 0.8;
+        this.scene.environmentIntensity = 0.75;
         this.left = this.right = this.bottom = 0; // margins that panels cover, pixels
         this.dirty = true;
         const ratio = Math.min(window.devicePixelRatio || 1, 2);
         this.pace = new Pace(RATIO_MIN / ratio, software ? 0.6 / ratio : 1);
+        this.effects = makeEffects(this, software, new URLSearchParams(location.search).get("effects"));
         this.sizeDue = true; // the canvas has not the size of its element yet
         new ResizeObserver(() => this.resize()).observe(canvas);
         // moving to a screen with another pixel ratio keeps the size
@@ -112,7 +115,8 @@ export class Stage {
     frameBox(box, up) {
         const [low, high] = box;
         this.up.fromArray(up).normalize();
-        this.target.set((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2);
+        this.middle.set((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2);
+        this.target.copy(this.middle);
         this.size = Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
         this.home();
     }
@@ -258,7 +262,8 @@ export class Stage {
         this.applySize();
         this.placeCamera();
         this.pace.begin(performance.now());
-        this.renderer.render(this.scene, this.camera);
+        if (this.effects) this.effects.render();
+        else this.renderer.render(this.scene, this.camera);
         // drawing continues after render returns: the fence signals its end
         const gl = /** @type {WebGL2RenderingContext} */ (this.renderer.getContext());
         const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -270,6 +275,7 @@ export class Stage {
             }
             gl.deleteSync(fence);
             if (this.pace.done(performance.now())) this.resize();
+            this.effects?.take(this.pace.costMs);
         };
         setTimeout(poll, POLL_MS);
     }

@@ -58,10 +58,10 @@ export const LOOKS = Object.freeze({
     },
     gall_bladder: {
         ...TISSUE,
-        colour: "#7f8f62",
-        tone: "#5c7350",
+        colour: "#74895f",
+        tone: "#4f6b55",
         inner: "#7d7b48",
-        glow: "#a5b060",
+        glow: "#8ea676",
         scatter: 0.5,
         wet: 0.9,
         filmRoughness: 0.14,
