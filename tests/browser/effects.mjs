@@ -1,6 +1,6 @@
 // What each visual feature costs a picture: prints a table. In software drawing the processor time of Chromium's drawing
 // process is measured, which other load on the machine changes little; with a graphics card the time until the picture is
-// finished would be. usage: node effects.mjs BUILD PICTURES [WIDTH HEIGHT]
+// finished would be. usage: node effects.mjs BUILD PICTURES [WIDTHxHEIGHT]
 import { check, launch, prepare, run, serve } from "./common.mjs";
 
 const PICTURES = 6; // a sample; the first two of a variant compile its shaders and do not count
@@ -51,7 +51,7 @@ const choose = (page, feature) =>
     }, feature);
 
 await run(async () => {
-    const [width, height] = process.argv[4] ? process.argv.slice(4, 6).map(Number) : [1280, 800];
+    const [width, height] = (process.argv[4] ?? "1280x800").split("x").map(Number);
     const server = await serve(prepare(), 0);
     const browser = await launch();
     const session = await browser.newBrowserCDPSession();

@@ -21,8 +21,8 @@ export class EffectChoice {
     skip = SETTLE;
 
     /**
-     * @param {string[]} names in the order in which they are tried
-     * @param {string[] | null} forced on whatever they cost; null: what is cheap enough
+     * @param {readonly string[]} names in the order in which they are tried
+     * @param {readonly string[] | null} forced on whatever they cost; null: what is cheap enough
      */
     constructor(names, forced) {
         this.untried = forced ? [] : [...names];
@@ -76,7 +76,7 @@ export class EffectChoice {
 
 /**
  * What the address asks for with `effects`: "all", "none", or names with commas; null: nothing.
- * @param {string | null} asked @param {string[]} names
+ * @param {string | null} asked @param {readonly string[]} names
  */
 export function forcedEffects(asked, names) {
     if (asked === null) return null;

@@ -1,9 +1,11 @@
 // Effects of the picture: shadows of the key light, and ambient occlusion, which darkens folds and contacts. They own the
 // passes of three.js that they need. An effect that is off has no light that casts, no pass and no buffer.
 import { EffectChoice, forcedEffects } from "./effect_choice.js";
+import { text } from "./text.js";
 import * as THREE from "./three.js";
 
-export const EFFECTS = ["shadow", "occlusion"];
+/** in the order in which they are tried */
+export const EFFECTS = Object.freeze(/** @type {const} */ (["shadow", "occlusion"]));
 
 const SHADOW_PIXELS = 2048;
 const SHADOW_DARKNESS = 0.9; // share of the key light that shadows take
@@ -142,7 +144,7 @@ export class PictureEffects {
     occlusion = null;
     loading = false;
 
-    /** @param {import("./stage.js").Stage} stage @param {string[] | null} forced on whatever they cost */
+    /** @param {import("./stage.js").Stage} stage @param {readonly string[] | null} forced on whatever they cost */
     constructor(stage, forced) {
         this.stage = stage;
         this.choice = new EffectChoice(EFFECTS, forced);
@@ -193,4 +195,14 @@ export class PictureEffects {
 export function makeEffects(stage, software, asked) {
     const forced = forcedEffects(asked, EFFECTS);
     return forced?.length === 0 || (software && !forced) ? null : new PictureEffects(stage, forced);
+}
+
+/** the effects that are on and what they cost, for people @param {PictureEffects | null} effects */
+export function effectsText(effects) {
+    const { on = new Set(), cost = new Map() } = effects?.choice ?? {};
+    const names = EFFECTS.filter((name) => on.has(name)).map((name) => {
+        const ms = cost.has(name) ? ` ${cost.get(name)?.toFixed(1)} ms` : "";
+        return text(`details.picture_effects.${name}`) + ms;
+    });
+    return names.join(", ") || text("details.picture_effects.none");
 }

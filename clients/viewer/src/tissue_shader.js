@@ -21,7 +21,7 @@ let patterns = null;
 function repeated(texture) {
     texture.wrapS = texture.wrapT = THREE.RepeatWrapping;
     texture.magFilter = THREE.LinearFilter;
-    texture.minFilter = THREE.LinearMipmapLinearFilter; // from far away patterns fade to their mean
+    texture.minFilter = THREE.LinearMipmapNearestFilter; // from far away patterns fade to their mean
     texture.generateMipmaps = true;
     texture.needsUpdate = true;
     return texture;
@@ -88,17 +88,19 @@ uniform float tissueVesselScale;
 uniform vec3 tissueVesselColour;
 varying vec3 vRestNormal;
 float tissueCover = 0.0;
-void tissueSide(vec2 at, vec3 u, vec3 v, float weight) {
-  vec4 seen = texture(tissueVessels, at * tissueVesselScale);
+void tissueSide(vec2 at, vec2 dx, vec2 dy, vec3 u, vec3 v, float weight) {
+  if (weight < 0.03) return; // mostly one side counts
+  vec4 seen = textureGrad(tissueVessels, at * tissueVesselScale, dx * tissueVesselScale, dy * tissueVesselScale);
   tissueCover += weight * seen.r;
   tissueSlope += weight * tissueRise.z * ((2.0 * seen.g - 1.0) * u + (2.0 * seen.b - 1.0) * v);
 }
 vec3 tissueVessel(vec3 surface) {
   vec3 side = pow(abs(normalize(vRestNormal)), vec3(6.0));
   side /= side.x + side.y + side.z;
-  tissueSide(vRest.yz, vec3(0, 1, 0), vec3(0, 0, 1), side.x);
-  tissueSide(vRest.zx + 0.31, vec3(0, 0, 1), vec3(1, 0, 0), side.y);
-  tissueSide(vRest.xy + 0.67, vec3(1, 0, 0), vec3(0, 1, 0), side.z);
+  vec3 dx = dFdx(vRest), dy = dFdy(vRest);
+  tissueSide(vRest.yz, dx.yz, dy.yz, vec3(0, 1, 0), vec3(0, 0, 1), side.x);
+  tissueSide(vRest.zx + 0.31, dx.zx, dy.zx, vec3(0, 0, 1), vec3(1, 0, 0), side.y);
+  tissueSide(vRest.xy + 0.67, dx.xy, dy.xy, vec3(1, 0, 0), vec3(0, 1, 0), side.z);
   return mix(surface, tissueVesselColour, tissueAmount.z * tissueCover);
 }
 #endif`;
