@@ -88,7 +88,7 @@ class Occlusion {
         this.buffer = new THREE.Vector2();
         this.pass = new GTAOPass(stage.scene, stage.camera, 1, 1);
         this.pass.output = GTAOPass.OUTPUT.Off;
-        this.pass.updatePdMaterial({ lumaPhi: 10, depthPhi: 2, normalPhi: 3, radius: 10, rings: 2, samples: 16 });
+        this.pass.updatePdMaterial({ lumaPhi: 10, normalPhi: 3, radius: 10, rings: 2, samples: 16 });
         this.quad = new FullScreenQuad(
             new THREE.ShaderMaterial({
                 uniforms: { map: { value: null }, darkness: { value: OCCLUSION_DARKNESS } },
@@ -120,6 +120,7 @@ void main() { gl_FragColor = vec4(vec3(mix(1.0, texture2D(map, at).r, darkness))
             scale: 1.25,
             samples: 16,
         });
+        this.pass.updatePdMaterial({ depthPhi: 0.25 * OCCLUSION_RADIUS * size }); // farther places are of another surface
         // with its output off the pass writes its own buffers alone
         this.pass.render(renderer, this.pass.gtaoRenderTarget, this.pass.gtaoRenderTarget, 0, false);
         /** @type {THREE.ShaderMaterial} */ (this.quad.material).uniforms.map.value = this.pass.gtaoMap;

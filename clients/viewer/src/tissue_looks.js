@@ -71,8 +71,8 @@ export const LOOKS = Object.freeze({
     },
     stomach: {
         ...TISSUE,
-        colour: "#c59a92",
-        tone: "#b27c76",
+        colour: "#b98d85",
+        tone: "#a5706a",
         inner: "#b06a64",
         glow: "#e88a7a",
         scatter: 0.5,
