@@ -137,6 +137,7 @@ if [ -z "$fast" ]; then
     step "a calibrated scene in the browser" sh "$tree/tests/browser/run.sh" calibrated "$build"
     step "an adaptive surface in the browser" sh "$tree/tests/browser/run.sh" adaptive "$build"
     step "sculpting in the browser" sh "$tree/tests/browser/run.sh" sculpt "$build"
+    step "looks in the browser" sh "$tree/tests/browser/run.sh" look "$build"
     step "error against cost in the browser" sh "$tree/tests/browser/run.sh" accuracy "$build"
     step "viewer, trainee and instructor in the browser" sh "$tree/tests/browser/run.sh" rights "$build"
     step "sessions opened and ended in the browser" sh "$tree/tests/browser/run.sh" lobby "$build"

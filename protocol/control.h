@@ -24,6 +24,7 @@
 #define PAL_WIRE_ARG_MAX       16
 #define PAL_WIRE_FIELDS_MAX    8 /* fields that a part may offer */
 #define PAL_WIRE_FIELD_BYTES   24
+#define PAL_WIRE_LOOK_BYTES    16
 #define PAL_WIRE_REASON_BYTES  128
 #define PAL_WIRE_LABEL_BYTES   120
 #define PAL_WIRE_METHOD_BYTES  32
@@ -81,7 +82,9 @@ typedef struct pal_wire_part_info {
     bool is_sculptable; /* its control cells and material can be changed by commands; false is not on the wire */
     bool is_adaptive;   /* its triangles change; clients that accept TOPOLOGY_DELTA get the changes, and n_triangle
                            counts slots */
-} pal_wire_part_info;   /* its index in the array is the part index   */
+    char appearance[PAL_WIRE_LOOK_BYTES]; /* "liver", "plastic" ...; "": unknown, and not on the wire  */
+    char colour[PAL_WIRE_LOOK_BYTES];     /* "#rrggbb" in place of the appearance's own; "": its own   */
+} pal_wire_part_info;                     /* its index in the array is the part index   */
 /* The components of a plan in order, of hello and topology: name, part whose body the component works on (-1: the whole
  * scene), reason (the key of the scene that calls for it), and whether it can be disabled (1: it cannot). n_part,
  * n_reason and n_required are n_component, or 0: unknown, and then not on the wire */

@@ -19,6 +19,8 @@ static const pal_control_field part_fields[] = {{"name", TEXT, true, ONE(part_in
                                                 {"fields", TEXTS, false, LIST(part_info, field, n_field), NULL},
                                                 {"adaptive", BOOL, false, ONE(part_info, is_adaptive)},
                                                 {"sculptable", BOOL, false, ONE(part_info, is_sculptable)},
+                                                {"appearance", TEXT_OR_EMPTY, false, ONE(part_info, appearance)},
+                                                {"colour", TEXT_OR_EMPTY, false, ONE(part_info, colour)},
                                                 {0}};
 static const pal_control_field tool_fields[] = {{"name", TEXT, true, ONE(tool_info, name)},
                                                 {"radius_m", F64, true, ONE(tool_info, radius_m)},

@@ -70,6 +70,8 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
         part->info.n_triangle = (uint32_t)shown->n_tri;
         part->info.is_adaptive = shown->is_adaptive;
         part->info.is_sculptable = shown->face != NULL;
+        pal_plain_text(part->info.appearance, sizeof part->info.appearance, s->scene->body[index].appearance);
+        pal_plain_text(part->info.colour, sizeof part->info.colour, s->scene->body[index].colour);
         if (!err && shown->is_adaptive)
             err = pal_triangle_slots_make(index, part->info.epoch, shown, diag, &part->slots);
         for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++)

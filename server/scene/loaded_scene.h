@@ -41,6 +41,8 @@ typedef struct pal_surface_scene {
     char axes[PAL_AXES_BYTES]; /* where x, y and z point in the patient, "LPS"; "": as the scan says, if it does */
     bool no_image;             /* of pal_scene_from_surface: leave the image of an OBJ file out */
     pal_image_map *image;      /* becomes where an image lies on an OBJ file's surface; NULL: none is shown */
+    const char *appearance;    /* a word of PAL_APPEARANCES; NULL: the name of the file or shape where it is one, else
+                                * plastic for control cells and none for others */
     double hold;               /* lowest part of the height held in place; 0: 0.05, of cells
                                 * more where that is not an eighth of the control vertices     */
     bool

@@ -2,6 +2,7 @@
  * that belong to the simulation are checked by pal_scene_check at the end. */
 #include "server/scene/scene_file.h"
 
+#include "server/base/flags.h"
 #include "server/base/heap.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/mesh/volume/image_seams.h"
@@ -170,6 +171,18 @@ static pal_err read_lists(const pal_json *at, pal_body_def *body)
     return PAL_ERR_OK;
 }
 
+static pal_err read_look(const pal_json *at, pal_body_def *body)
+{
+    const char *digits = body->colour + 1;
+    PAL_TRY(pal_json_text(at, "appearance", false, body->appearance, sizeof body->appearance));
+    if (body->appearance[0] && pal_flag_word(PAL_APPEARANCES, body->appearance) < 0)
+        return pal_json_refuse_key(at, "appearance", "\"%s\" is not one of %s", body->appearance, PAL_APPEARANCES);
+    PAL_TRY(pal_json_text(at, "colour", false, body->colour, sizeof body->colour));
+    if (body->colour[0] && (body->colour[0] != '#' || strspn(digits, "0123456789abcdefABCDEF") != 6))
+        return pal_json_refuse_key(at, "colour", "\"%s\" is not a colour as #82352b", body->colour);
+    return PAL_ERR_OK;
+}
+
 static pal_err read_body(const pal_json *at, int index, pal_loaded_scene *scene)
 {
     char name[PAL_NAME];
@@ -183,6 +196,7 @@ static pal_err read_body(const pal_json *at, int index, pal_loaded_scene *scene)
     else
         pal_body_default(body, name, &scene->mesh[index]);
     if (!solid && pal_json_has(at, "origin_m")) return pal_json_refuse(at, "origin_m only goes with cells");
+    PAL_TRY(read_look(at, body));
     PAL_TRY(read_material(at, &body->material));
     PAL_TRY(read_model(at, scene, index));
     PAL_TRY(read_item_at(at, "solver", &body->solver));

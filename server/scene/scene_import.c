@@ -9,6 +9,7 @@
 #include "server/scene/scene_import.h"
 
 #include "server/base/clock.h"
+#include "server/base/flags.h"
 #include "server/base/utf8.h"
 #include "server/base/vec3.h"
 #include "server/mesh/files/mesh_file.h"
@@ -319,6 +320,11 @@ static pal_err make_body(pal_loaded_scene *loaded, const char *name, const pal_s
         pal_body_default_cells(body, plain, &loaded->mesh[0], cells);
     else
         pal_body_default(body, plain, &loaded->mesh[0]);
+    const char *look = options->appearance                          ? options->appearance
+                       : pal_flag_word(PAL_APPEARANCES, plain) >= 0 ? plain
+                       : cells                                      ? "plastic"
+                                                                    : "";
+    snprintf(body->appearance, sizeof body->appearance, "%.15s", look);
     if (!options->gravity) leave_gravity_out(body);
     /* as many levels as run in real time; cells that are no hexahedra need one */
     const int n_level = options->n_level                                     ? options->n_level
@@ -531,6 +537,9 @@ pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene 
     if (err && reason.text[0]) pal_diagnostic_set(diag, err, "%s: %s", name, reason.text);
     pal_surface_free(&shape.surface);
     if (!err) err = make_body(loaded, shape.name, options, report, diag);
+    pal_body_def *body = &loaded->scene.body[0];
+    if (!body->appearance[0] && !strcmp(shape.name, "organ"))
+        snprintf(body->appearance, sizeof body->appearance, "liver");
     if (!err) err = apply_shape(&loaded->scene, &shape, options, diag);
     if (!err) err = drop_loose(loaded, options, report, diag);
     if (err) {

@@ -90,6 +90,8 @@ static cJSON *body_json(const pal_scene *scene, int index)
         PAL_JSON_ADD(object, {"image", JSON_TEXT(name)});
         mesh_name(scene, index, name);
     }
+    if (body->appearance[0]) PAL_JSON_ADD(object, {"appearance", JSON_TEXT(body->appearance)});
+    if (body->colour[0]) PAL_JSON_ADD(object, {"colour", JSON_TEXT(body->colour)});
     if (body->cells) pal_subdivision_append(object, body, name);
     PAL_JSON_ADD(object, {"material",
                           PAL_JSON({"young_Pa", pal_json_exact(m->young_Pa)}, {"poisson", pal_json_exact(m->poisson)},

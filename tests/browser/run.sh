@@ -12,6 +12,8 @@
 #   lobby     sessions of a server, opened and ended by an instructor
 #   access    keyboard, screen readers, other languages, telephones
 #   plots     force, displacement, work and step time over time; pictures and videos of the page
+#   look      a look for each organ, patterns that stick to tissue, shadows and occlusion
+#   effects   no test: prints what each visual feature costs a picture
 #   views     an endoscope, saved views, two views side by side, stereo and a headset
 #   together  two browsers, a haptic bridge and lcm-logger on one organ; in a network namespace of its own
 # BUILD is the folder of deploy/test.sh (release/bin/palpate, viewer_packages); PICTURES keeps the screenshots.

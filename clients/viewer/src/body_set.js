@@ -2,6 +2,7 @@
 // each part is applied once per drawn picture.
 import { BodyMesh } from "./body_mesh.js";
 import { showImage } from "./surface_image.js";
+import { lookOf } from "./tissue_looks.js";
 
 export const UNSEEN = 2e-5; // motion in units of the scene's size that is not worth a new picture: below 1/20 pixel
 
@@ -43,8 +44,8 @@ export class BodySet {
     takePart({ part, epoch, rest, uv, triangles, visible }) {
         this.pending.get(part)?.dispose();
         this.frames.delete(part); // of the older topology
-        const body = new BodyMesh(this.stage.scene, rest, triangles, visible);
-        const { image } = this.state.parts[part] ?? {};
+        const { appearance, colour, image } = this.state.parts[part] ?? {};
+        const body = new BodyMesh(this.stage.scene, rest, triangles, visible, lookOf(appearance, colour));
         if (uv && image) showImage(body, uv, image, this.stage);
         const waits = this.state.bodies.has(part);
         body.epoch = epoch;

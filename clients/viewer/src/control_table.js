@@ -16,6 +16,8 @@ const part = /** @type {const} */ ({
     "fields?": "texts",
     "adaptive?": "bool",
     "sculptable?": "bool",
+    "appearance?": "text",
+    "colour?": "text",
 });
 
 const member = /** @type {const} */ ({

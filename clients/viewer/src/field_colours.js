@@ -1,6 +1,6 @@
 // The values of a field on one body, blended from one set to the next and shown as colours by the tissue's shader.
 import * as THREE from "./three.js";
-import { makeUniforms, MATT, WET } from "./tissue_material.js";
+import { makeUniforms, MATT } from "./tissue_material.js";
 
 const BLEND_MS = 100; // the interval of FIELD messages
 
@@ -48,7 +48,7 @@ export class FieldColours {
     /** @param {boolean} on */
     enable(on) {
         this.uniforms.mix.value = on ? 1 : 0;
-        if (this.material) Object.assign(this.material, on ? MATT : WET);
+        if (this.material) Object.assign(this.material, on ? MATT : this.material.userData.wet);
     }
 
     /** values of the first and the last colour @param {{low: number, high: number}} range */

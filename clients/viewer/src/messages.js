@@ -2,6 +2,7 @@
 import { UNSEEN } from "./body_set.js";
 import { buttonById, htmlById } from "./dom.js";
 import { componentsOf, idleText } from "./plan_list.js";
+import { effectsText } from "./picture_effects.js";
 import { speedText } from "./plan_panel.js";
 import { playbackText } from "./playback_bar.js";
 import { text as textOf } from "./text.js";
@@ -279,9 +280,10 @@ export class Messages {
     }
 
     showFigures() {
-        const { accuracy, panel, state } = this.page;
+        const { accuracy, panel, stage, state } = this.page;
         if (htmlById("panel").hidden || !state.status) return;
         this.page.members.showOrders();
+        state.figures.effects = effectsText(stage.effects);
         panel.showStatus(state.status, state.figures, state.parts);
         htmlById("idle").textContent = idleText({
             field: state.field !== "none",

@@ -3,6 +3,7 @@
 import { makeBackdrop } from "./backdrop.js";
 import { OrbitView } from "./orbit_view.js";
 import { Pace } from "./pace.js";
+import { makeEffects } from "./picture_effects.js";
 import * as THREE from "./three.js";
 import { ViewPane } from "./view_pane.js";
 
@@ -39,13 +40,19 @@ function makeStudio(renderer) {
     };
     const room = new THREE.Mesh(
         new THREE.SphereGeometry(10, 24, 16),
-        new THREE.MeshBasicMaterial({ color: 0x20272e, side: THREE.BackSide }),
+        new THREE.MeshBasicMaterial({ color: 0x2a2725, side: THREE.BackSide }),
     );
     studio.add(room);
-    panel(9, "#fff4e6", [0, 2, 7], [6, 4, 0.2]); // above
-    panel(5, "#dcebff", [-7, 0, 2], [0.2, 4, 5]); // cool side
-    panel(3, "#ffe2c4", [7, -2, 1], [0.2, 3, 3]); // warm side
-    panel(0.6, "#8fa3b5", [0, 0, -7], [9, 9, 0.2]); // light from below, weak
+    // lamps above, small and bright as in an operating room: their reflections in wet tissue are spots, not patches
+    for (const [x, y] of [
+        [-2.4, 1],
+        [0, -2.2],
+        [2.4, 1],
+    ])
+        panel(26, "#fff6ea", [x, y, 7], [1.3, 1.3, 0.2]);
+    panel(0.9, "#fff4ea", [-7, 0, 2], [0.2, 7, 7]);
+    panel(0.7, "#fff2e6", [7, -2, 1], [0.2, 6, 6]);
+    panel(0.35, "#c9b7ab", [0, 0, -7], [9, 9, 0.2]); // light from below, weak
     const generator = new THREE.PMREMGenerator(renderer);
     const texture = generator.fromScene(studio, 0.035).texture;
     generator.dispose();
@@ -64,8 +71,8 @@ export class Stage {
         this.canvas = canvas;
         const software = isSoftwareRenderer();
         this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !software, powerPreference: "high-performance" });
-        this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
-        this.renderer.toneMappingExposure = 1.0;
+        this.renderer.toneMapping = THREE.NeutralToneMapping;
+        this.renderer.toneMappingExposure = 1.05;
         this.scene = new THREE.Scene();
         const light = window.matchMedia("(prefers-color-scheme: light)");
         this.scene.background = makeBackdrop(light.matches);
@@ -81,18 +88,19 @@ export class Stage {
         this.views = [this.free];
         this.panes = [new ViewPane(this.free)];
         this.pane = this.panes[0]; // the one under the pointer: it takes the input
-        this.key = new THREE.DirectionalLight(0xfff2e2, 1.9);
-        this.rim = new THREE.DirectionalLight(0xbfd8ff, 1.1);
-        this.fill = new THREE.DirectionalLight(0xffe9dc, 0.85); // from the camera and below: no visible side is black
-        this.scene.add(this.key, this.rim, this.fill, new THREE.HemisphereLight(0xdfe9f2, 0x4a332b, 1.15));
+        this.key = new THREE.DirectionalLight(0xfff5ea, 2.6);
+        this.rim = new THREE.DirectionalLight(0xfff1e6, 1.0);
+        this.fill = new THREE.DirectionalLight(0xfff0e8, 0.6); // from the camera and below: no visible side is black
+        this.scene.add(this.key, this.rim, this.fill, new THREE.HemisphereLight(0xe9eaec, 0x3f3430, 0.85));
         this.scene.environment = makeStudio(this.renderer);
-        this.scene.environmentIntensity = 0.8;
+        this.scene.environmentIntensity = 0.75;
         /** @type {{draw: () => void} | null} what draws for a headset, at its pace */
         this.immersive = null;
         this.left = this.right = this.bottom = 0; // margins that panels cover, pixels
         this.dirty = true;
         const ratio = Math.min(window.devicePixelRatio || 1, 2);
         this.pace = new Pace(RATIO_MIN / ratio, software ? 0.6 / ratio : 1);
+        this.effects = makeEffects(this, software, new URLSearchParams(location.search).get("effects"));
         this.sizeDue = true; // the canvas has not the size of its element yet
         new ResizeObserver(() => this.resize()).observe(canvas);
         // moving to a screen with another pixel ratio keeps the size
@@ -252,9 +260,10 @@ export class Stage {
         this.renderer.setSize(this.canvas.clientWidth || 1, this.canvas.clientHeight || 1, false);
     }
 
-    /** draws the whole canvas as a camera sees the scene @param {THREE.Camera} camera */
+    /** draws the whole canvas as a camera sees the scene @param {THREE.PerspectiveCamera} camera */
     render(camera) {
-        this.renderer.render(this.scene, camera);
+        if (this.effects && this.view.kind === "free") this.effects.render(camera);
+        else this.renderer.render(this.scene, camera);
     }
 
     drawPanes() {
@@ -291,6 +300,7 @@ export class Stage {
             }
             gl.deleteSync(fence);
             if (this.pace.done(performance.now())) this.resize();
+            this.effects?.take(this.pace.costMs);
         };
         setTimeout(poll, POLL_MS);
     }

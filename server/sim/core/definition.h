@@ -68,10 +68,17 @@ typedef struct pal_stroke {
 } pal_stroke;
 enum { PAL_STROKE_MAX = 4096 };
 
+/* what a body may look like (clients/viewer/src/tissue_looks.js draws each); no effect on its mechanics */
+#define PAL_APPEARANCES                                                                                                \
+    "liver|gall_bladder|stomach|intestine|kidney|spleen|pancreas|heart|lung|brain|vessel|bone|fat|muscle|skin|plastic"
+enum { PAL_APPEARANCE_BYTES = 16, PAL_COLOUR_BYTES = 8 };
+
 typedef struct pal_body_def {
     char name[PAL_NAME];
-    const pal_prepared *mesh; /* borrowed                                                        */
-    const pal_image *image;   /* shown on mesh->surface, which has uv then; borrowed; NULL: none */
+    char appearance[PAL_APPEARANCE_BYTES]; /* a word of PAL_APPEARANCES; "": unknown */
+    char colour[PAL_COLOUR_BYTES];         /* "#rrggbb" in place of the appearance's own; "": its own */
+    const pal_prepared *mesh;              /* borrowed                                                        */
+    const pal_image *image;                /* shown on mesh->surface, which has uv then; borrowed; NULL: none */
     /* model subdivision_fem: control cells, body frame, borrowed; NULL for other models. mesh then has the triangles of
      * the control cells' boundary alone (surface), for size, origin and messages */
     const pal_cells *cells;
