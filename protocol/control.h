@@ -24,6 +24,7 @@
 #define PAL_WIRE_ARG_MAX       16
 #define PAL_WIRE_FIELDS_MAX    8 /* fields that a part may offer */
 #define PAL_WIRE_FIELD_BYTES   24
+#define PAL_WIRE_LOOK_BYTES    16
 #define PAL_WIRE_REASON_BYTES  128
 #define PAL_WIRE_LABEL_BYTES   120
 #define PAL_WIRE_METHOD_BYTES  32
@@ -73,6 +74,8 @@ typedef struct pal_wire_part_info {
     uint32_t epoch;
     uint32_t n_vertex, n_triangle;
     char asset[PAL_WIRE_NAME_BYTES]; /* path on the same server: "/asset/<hash>"   */
+    char image[PAL_WIRE_NAME_BYTES]; /* the same, of the image on its surface (PNG, JPEG), whose asset has uv; "": none,
+                                        and not on the wire */
     double error_m;                  /* bound per axis of its frames in normal use */
     uint32_t n_field;                /* fields for `subscribe_field`; 0 also from servers without fields */
     char field[PAL_WIRE_FIELDS_MAX][PAL_WIRE_FIELD_BYTES]; /* "displacement", "von_mises" ...           */
@@ -80,7 +83,9 @@ typedef struct pal_wire_part_info {
     bool is_sculptable; /* its control cells and material can be changed by commands; false is not on the wire */
     bool is_adaptive;   /* its triangles change; clients that accept TOPOLOGY_DELTA get the changes, and n_triangle
                            counts slots */
-} pal_wire_part_info;   /* its index in the array is the part index   */
+    char appearance[PAL_WIRE_LOOK_BYTES]; /* "liver", "plastic" ...; "": unknown, and not on the wire  */
+    char colour[PAL_WIRE_LOOK_BYTES];     /* "#rrggbb" in place of the appearance's own; "": its own   */
+} pal_wire_part_info;                     /* its index in the array is the part index   */
 /* The components of a plan in order, of hello and topology: name, part whose body the component works on (-1: the whole
  * scene), reason (the key of the scene that calls for it), and whether it can be disabled (1: it cannot). n_part,
  * n_reason and n_required are n_component, or 0: unknown, and then not on the wire */
@@ -121,6 +126,8 @@ typedef struct pal_wire_hello {
     uint32_t credit;                   /* unacknowledged cycles the server allows now                 */
     double box_min_m[3], box_max_m[3]; /* of the whole scene at rest                            */
     double up[3];                      /* unit, away from the ground                            */
+    char anatomical_axes[4];           /* where x, y and z point in the patient: "RAS"; "": not known, and not on the
+                                          wire */
     uint32_t n_part, n_tool;
     pal_wire_part_info part[PAL_WIRE_PART_MAX];
     pal_wire_tool_info tool[PAL_WIRE_TOOL_MAX];

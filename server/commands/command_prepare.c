@@ -25,7 +25,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { PATH = 1200, TETGEN_MAX = 1000000, LABELS = 256, FILES = 64, SENTENCE = 160 };
+enum { PATH = 1200, TETGEN_MAX = 1000000, LABELS = 256, FILES = 64, SENTENCE = 160, RESOLUTION_MAX = 1024 };
 
 static const char about[] =
     "Makes a scene from a surface (OBJ, STL, PLY, OFF) or a segmented scan (NIfTI .nii .nii.gz, INRIMAGE .inr\n"
@@ -43,7 +43,7 @@ static const char about[] =
 
 typedef struct arguments {
     pal_surface_scene scene;
-    const char *folder, *units, *up, *name, *title, *source, *model;
+    const char *folder, *units, *up, *axes, *name, *title, *source, *model;
     double hold_percent, thickness_mm;
     bool procedural, list_labels, tetgen, no_tetgen;
 } arguments;
@@ -55,10 +55,11 @@ typedef struct outcome {
     size_t world_byte;
     double limit_s;
     int n_substep,
-        fine_substep;    /* of a step at rest; with a face of the finest level, as each level halves the bound */
-    int max_node;        /* limit of the component refine; 0: none is needed                                  */
-    double busy;         /* predicted share of real time with as many nodes as the limit allows               */
-    char size[SENTENCE]; /* a question about the unit; "": the size is an organ's */
+        fine_substep;          /* of a step at rest; with a face of the finest level, as each level halves the bound */
+    int max_node;              /* limit of the component refine; 0: none is needed                                  */
+    double busy;               /* predicted share of real time with as many nodes as the limit allows               */
+    char size[SENTENCE];       /* a question about the unit; "": the size is an organ's */
+    char volume[2 * SENTENCE]; /* what the voxels do to a thin organ, and the remedy; "": they fit it */
     char slow[PAL_PREFLIGHT_LINE]; /* the body returns slowly; "": it does not, or its world takes long */
     char file[FILES][80];
     int n_file;
@@ -208,8 +209,10 @@ static cJSON *as_json(const pal_loaded_scene *loaded, const arguments *args, con
         {"units", PAL_JSON({"name", JSON_TEXT(args->units ? args->units : r->unit_name)}, {"m", JSON_NUMBER(r->unit_m)},
                            {"guessed", JSON_BOOL(r->unit_guessed)})},
         {"label", r->label >= 0 ? JSON_NUMBER(r->label) : NULL}, {"triangles", JSON_NUMBER(mesh->surface.n_tri)},
-        {"vertices", JSON_NUMBER(mesh->surface.n_vertex)},
-        {"size_question", out->size[0] ? JSON_TEXT(out->size) : NULL});
+        {"vertices", JSON_NUMBER(mesh->surface.n_vertex)}, {"anatomical_axes", r->axes[0] ? JSON_TEXT(r->axes) : NULL},
+        {"image", r->image[0] ? JSON_TEXT(r->image) : NULL},
+        {"size_question", out->size[0] ? JSON_TEXT(out->size) : NULL},
+        {"volume_remark", out->volume[0] ? JSON_TEXT(out->volume) : NULL});
     if (r->n_level > 0)
         add_levels(o, out);
     else
@@ -223,8 +226,8 @@ static cJSON *as_json(const pal_loaded_scene *loaded, const arguments *args, con
                               {"split", JSON_NUMBER(r->prepare.split_s)}, {"skin", JSON_NUMBER(r->prepare.skin_s)},
                               {"write", JSON_NUMBER(out->write_s)}, {"total", JSON_NUMBER(out->total_s)});
     return PAL_JSON_ADD(o, {"dropped", dropped}, {"mended", JSON_NUMBER(read->n_repaired)},
-                        {"welded", JSON_NUMBER(read->n_welded)}, {"slow", out->slow[0] ? JSON_TEXT(out->slow) : NULL},
-                        {"seconds", seconds});
+                        {"welded", JSON_NUMBER(read->n_welded)}, {"welded_apart_m", JSON_NUMBER(read->max_weld_m)},
+                        {"slow", out->slow[0] ? JSON_TEXT(out->slow) : NULL}, {"seconds", seconds});
 }
 
 /* in the unit that gives one to four digits before the decimal point; returns out */
@@ -294,6 +297,7 @@ static void print(const pal_loaded_scene *loaded, const arguments *args, const o
         printf(", no unit fits the size in the file: scaled to an organ (--units overrides)");
     else if (r->unit_guessed)
         printf(", unit %s guessed from the size (--units overrides)", r->unit_name);
+    if (r->axes[0]) printf(", axes %s", r->axes);
     if (r->n_label > 1 && args->scene.label < 0)
         printf(", the most frequent of %d labels (--list-labels lists them)", r->n_label);
     printf("\n");
@@ -304,12 +308,12 @@ static void print(const pal_loaded_scene *loaded, const arguments *args, const o
     if (n_component > 1) printf("the components are not connected, each has its own support (--largest keeps one)\n");
     pal_loose_components_describe(&loaded->loose[0], loaded->scene.body[0].name, &dropped);
     if (dropped.text[0]) printf("%s\n", dropped.text);
+    if (r->image[0]) printf("%s\n", r->image);
     if (out->slow[0]) printf("%s\n", out->slow);
     if (out->size[0]) printf("%s\n", out->size);
-    if (r->n_level == 0 && fabs(r->prepare.volume_error) > PAL_VOLUME_MISSED)
-        printf("the voxels miss the volume of the surface by %.0f %%: a larger --resolution comes nearer, and --model "
-               "adaptive keeps the surface itself\n",
-               100 * fabs(r->prepare.volume_error));
+    if (out->volume[0]) printf("%s\n", out->volume);
+    if (d->max_weld_m > 0)
+        printf("welded %lld corners that were up to %.2g mm apart\n", (long long)d->n_welded, 1e3 * d->max_weld_m);
     if (d->n_degenerate + d->n_duplicate + d->n_nonfinite + d->n_folded > 0)
         printf("dropped triangles: %lld degenerate, %lld duplicate, %lld not finite, %lld folded\n",
                (long long)d->n_degenerate, (long long)d->n_duplicate, (long long)d->n_nonfinite,
@@ -379,6 +383,35 @@ static void question_size(const pal_loaded_scene *loaded, double unit_m, char te
         snprintf(text, SENTENCE, "the body is %.3g m long: is its unit right? (--units)", size_m);
 }
 
+/* A thin organ is missed by its voxels, or by their layer around it that model springs counts in full, while model fem
+ * weighs each voxel by its filled share. What shells that are open or lie in each other enclose is uncertain at any
+ * resolution. */
+static void judge_volume(const pal_surface_scene_report *r, const pal_surface_scene *options, char text[2 * SENTENCE])
+{
+    const double missed = 100 * fabs(r->prepare.volume_error), surface_m3 = r->prepare.voxel.surface_volume_m3;
+    const double whole = surface_m3 > 0 ? r->prepare.volume_m3 / surface_m3 : 0;
+    const int finer = (int)fmin(2 * r->resolution, RESOLUTION_MAX);
+    text[0] = 0;
+    if (r->n_level > 0) return;
+    if (missed > 100 * PAL_VOLUME_MISSED && r->prepare.voxel.open)
+        snprintf(
+            text, 2 * SENTENCE,
+            "the voxels miss the volume of the surface by %.0f %%, which is uncertain as the surface is open: close "
+            "its holes and join its shells, or --model adaptive keeps the surface itself",
+            missed);
+    else if (missed > 100 * PAL_VOLUME_MISSED)
+        snprintf(text, 2 * SENTENCE,
+                 "the voxels miss the volume of the surface by %.0f %%%s: --resolution %d comes nearer, and --model "
+                 "adaptive keeps the surface itself",
+                 missed, options->largest_only ? " with what --largest leaves out" : "", finer);
+    else if (!options->fem && whole > PAL_LAYER_OUTWEIGHS)
+        snprintf(
+            text, 2 * SENTENCE,
+            "with their border layer the voxels have %.1f times the volume of the surface, as parts of it are thin: "
+            "--model fem counts what lies inside, --resolution %d comes nearer, --model adaptive keeps the surface",
+            whole, finer);
+}
+
 static int run(pal_flag_common *common, const char *in, arguments *args)
 {
     pal_loaded_scene *loaded = NULL;
@@ -391,6 +424,7 @@ static int run(pal_flag_common *common, const char *in, arguments *args)
                       : pal_scene_from_surface(in, &args->scene, &loaded, &out.report, &diag);
     if (err) return pal_report_refusal(common, err, &diag);
     question_size(loaded, out.report.unit_m, out.size);
+    judge_volume(&out.report, &args->scene, out.volume);
     err = pal_scene_rename(loaded, args->name, args->title, args->source, &diag);
     if (!err && args->scene.adaptive) err = limit_nodes(loaded, in ? in : "procedural", &out, &diag);
     if (!err) err = pal_diagnostic_prefix(&diag, find_return(loaded, &out, &diag), in ? in : "procedural");
@@ -451,7 +485,7 @@ static const pal_flag flag[] = {
     {"--model", "springs|fem|adaptive", PAL_FLAG_WORD, &args.model, 0, 0,
      "mass-spring tetrahedra (paper B); finite elements, implicit; or a surface of springs that\n"
      "refines where it is touched (paper C) (springs)"},
-    {"--resolution", "N", PAL_FLAG_COUNT, &args.scene.resolution, 1, 1024,
+    {"--resolution", "N", PAL_FLAG_COUNT, &args.scene.resolution, 1, RESOLUTION_MAX,
      "voxels along the longest axis (the number that gives 13,000 tetrahedra, or 2,500 nodes for fem)"},
     {"--element", "hex8_bbar|hex8|tet4|tet10", PAL_FLAG_WORD, &args.scene.element, 0, 0, "fem: element (hex8_bbar)"},
     {"--law", "corotational|neo_hookean|linear", PAL_FLAG_WORD, &args.scene.law, 0, 0,
@@ -468,6 +502,8 @@ static const pal_flag flag[] = {
      "springs: preserve face areas too (edges and volumes alone have the same moduli at half the cost)"},
     {"--label", "N", PAL_FLAG_COUNT, &args.scene.label, 1, INT32_MAX, "label of a segmented scan (the most frequent)"},
     {"--list-labels", NULL, PAL_FLAG_SWITCH, &args.list_labels, 0, 0, "only list the labels of a segmented scan"},
+    {"--no-image", NULL, PAL_FLAG_SWITCH, &args.scene.no_image, 0, 0,
+     "leave the image of an OBJ file out (map_Kd of its first material: a PNG or JPEG beside the file)"},
     {"--units", "UNIT", PAL_FLAG_TEXT, &args.units, 0, 0,
      "unit of a surface file: m, cm, mm, um or in (guessed from the size)"},
     {"--triangles", "N", PAL_FLAG_COUNT, &args.scene.target_tri, 100, 10000000,
@@ -485,8 +521,14 @@ static const pal_flag flag[] = {
     {"--damping-ratio", "Z", PAL_FLAG_NUMBER, &args.scene.material.damping_ratio, 0, PAL_FACTOR_MAX,
      "damping of the slowest mode over the critical one, as long as the rate stays below 4 1/s (1)"},
     {"--up", "AXIS", PAL_FLAG_TEXT, &args.up, 0, 0, "x, y, z, -x, -y or -z: the direction against gravity (z)"},
+    {"--axes", "LETTERS", PAL_FLAG_TEXT, &args.axes, 0, 0,
+     "where x, y and z of the file point in the patient: R or L, A or P, S or I, as in RAS or LPS; the page\nshows "
+     "them "
+     "(those of a NIfTI scan, else not known)"},
     {"--hold", "PERCENT", PAL_FLAG_NUMBER, &args.hold_percent, 0.1, 100,
      "lowest part of the height that is fixed (5; an open adaptive surface: its open edges)"},
+    {"--appearance", PAL_APPEARANCES, PAL_FLAG_WORD, &args.scene.appearance, 0, 0,
+     "what the body looks like in the viewer (its name where it is one of these, else neutral)"},
     {"--gravity", NULL, PAL_FLAG_SWITCH, &args.scene.gravity, 0, 0,
      "add gravity (a scanned shape is already in balance with its weight)"},
     {"--name", "NAME", PAL_FLAG_TEXT, &args.name, 0, 0, "name of the scene, a-z 0-9 _ - (from the file name)"},
@@ -521,6 +563,9 @@ int command_prepare(int argc, char **argv)
     if (args.tetgen && args.no_tetgen) return pal_flags_wrong(&common, "--tetgen and --no-tetgen exclude each other");
     if (args.up && !read_axis(args.up, args.scene.up))
         return pal_flags_wrong(&common, "--up: is not x, y, z, -x, -y or -z");
+    const char *fault = args.axes ? pal_anatomical_axes_fault(args.axes) : NULL;
+    if (fault) return pal_flags_wrong(&common, "--axes: %.20s %s", args.axes, fault);
+    if (args.axes) snprintf(args.scene.axes, sizeof args.scene.axes, "%.3s", args.axes);
     pal_material *m = &args.scene.material;
     if (m->young_Pa == 0) m->young_Pa = args.scene.adaptive ? PAL_WALL_YOUNG_PA : PAL_SOLID_YOUNG_PA;
     args.scene.hold = args.hold_percent / 100;

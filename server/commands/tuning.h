@@ -25,8 +25,10 @@
 #define PAL_LCM_RESTART_NS 1000000000u
 #define PAL_LCM_LEAVE_NS   1000000000u
 /* m: sizes between which `palpate prepare` takes a body for one that a hand works on, from a lymph node to a torso;
- * share of the volume that voxels may miss (tests/house/test_commands.sh) */
-#define PAL_ORGAN_MIN_M   0.005
-#define PAL_ORGAN_MAX_M   1.5
-#define PAL_VOLUME_MISSED 0.05
+ * share of the volume that voxels may miss; volume with the border layer over that of the surface beyond which more
+ * of the body lies outside the surface than inside (tests/house/test_commands.sh) */
+#define PAL_ORGAN_MIN_M     0.005
+#define PAL_ORGAN_MAX_M     1.5
+#define PAL_VOLUME_MISSED   0.05
+#define PAL_LAYER_OUTWEIGHS 2
 #endif

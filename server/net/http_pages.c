@@ -275,11 +275,12 @@ static void get_metrics(pal_hub *hub, const pal_request *request, pal_reply *rep
 
 static pal_packet *find_asset(const pal_hub_room *room, const char *path)
 {
-    for (int p = 0; p < room->stream->n_part; p++)
-        if (!strcmp(room->stream->part[p].info.asset, path))
-            return room->stream->part[p].asset;
-        else if (!strcmp(room->stream->part[p].info.interior, path))
-            return room->stream->part[p].interior_asset;
+    for (int p = 0; p < room->stream->n_part; p++) {
+        const pal_stream_part *part = &room->stream->part[p];
+        if (!strcmp(part->info.asset, path)) return part->asset;
+        if (!strcmp(part->info.interior, path)) return part->interior_asset;
+        if (part->image && !strcmp(part->info.image, path)) return part->image;
+    }
     for (int i = 0; i < PAL_HUB_OLD_ASSETS; i++)
         if (room->past[i].asset && !strcmp(room->past[i].path, path)) return room->past[i].asset;
     return NULL;
@@ -291,7 +292,8 @@ static bool get_asset(pal_hub *hub, const char *path, pal_reply *reply)
     for (int r = 0; r < hub->n_room && !asset; r++) asset = find_asset(hub->room[r], path);
     if (!asset) return false;
     reply->status = 200;
-    reply->type = "application/octet-stream";
+    const char *type = pal_image_type(asset->bytes, asset->n_byte);
+    reply->type = type ? type : "application/octet-stream";
     reply->caching = "public, max-age=31536000, immutable";
     snprintf(reply->etag, sizeof reply->etag, "\"%.40s\"", strrchr(path, '/') + 1);
     reply->body = pal_packet_hold(asset);

@@ -52,7 +52,7 @@ static int encode_interior(const pal_shown *shown, uint8_t **bytes, size_t *n_by
     }
     if (!refusal) {
         order->level_begin[0] = 0, order->level_begin[1] = n;
-        refusal = pal_asset_encode(rest_m, order, face, 2 * n_tet, bytes, n_byte);
+        refusal = pal_asset_encode(rest_m, NULL, order, face, 2 * n_tet, bytes, n_byte);
     }
     free(rest_m);
     free(face);
@@ -78,6 +78,16 @@ static pal_err open_interior(pal_stream_part *part, const pal_shown *shown, pal_
     return part->interior_asset ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
+static pal_err name_image(pal_stream_part *part, const pal_image *image)
+{
+    char hash[PAL_ASSET_HASH_CHARS];
+    part->image = pal_packet_create(image->bytes, image->n_byte, false);
+    if (!part->image) return PAL_ERR_MEMORY;
+    pal_asset_hash(image->bytes, image->n_byte, hash);
+    snprintf(part->info.image, sizeof part->info.image, "/asset/%s", hash);
+    return PAL_ERR_OK;
+}
+
 /* builds the asset and encoders of one part */
 static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_diagnostic *diag)
 {
@@ -88,6 +98,7 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
     char hash[PAL_ASSET_HASH_CHARS];
     pal_err err = PAL_ERR_OK;
     const uint32_t *tri = (const uint32_t *)shown->tri; /* indices are nonnegative */
+    const pal_image *image = shown->uv ? s->scene->body[index].image : NULL;
 
     int refusal =
         shown->parent
@@ -96,7 +107,8 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
                                         (uint32_t)shown->n_coarse_tri, &order)
             : pal_frame_order_create(shown->rest_m, (uint32_t)shown->n_vertex, tri, (uint32_t)shown->n_tri, &order);
     if (refusal) return refuse(diag, refusal, shown->name, "no vertex order");
-    refusal = pal_asset_encode(shown->rest_m, order, tri, (uint32_t)shown->n_tri, &bytes, &n_byte);
+    refusal =
+        pal_asset_encode(shown->rest_m, image ? shown->uv : NULL, order, tri, (uint32_t)shown->n_tri, &bytes, &n_byte);
     if (refusal) err = refuse(diag, refusal, shown->name, "no asset");
     for (int t = 0; !err && t < PAL_STREAM_TIER_COUNT; t++) {
         refusal = pal_frame_encoder_create(shown->rest_m, order, &s->encoder[index][t]);
@@ -106,13 +118,16 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
     if (!err) {
         pal_asset_hash(bytes, n_byte, hash);
         snprintf(part->info.asset, sizeof part->info.asset, "/asset/%s", hash);
+        if (image) err = name_image(part, image);
         pal_plain_text(part->info.name, sizeof part->info.name, shown->name);
         part->info.epoch = 1;
         part->info.n_vertex = (uint32_t)shown->n_vertex;
         part->info.n_triangle = (uint32_t)shown->n_tri;
         part->info.is_adaptive = shown->is_adaptive;
         part->info.is_sculptable = shown->face != NULL;
-        err = open_interior(part, shown, diag);
+        if (!err) err = open_interior(part, shown, diag);
+        pal_plain_text(part->info.appearance, sizeof part->info.appearance, s->scene->body[index].appearance);
+        pal_plain_text(part->info.colour, sizeof part->info.colour, s->scene->body[index].colour);
         if (!err && shown->is_adaptive)
             err = pal_triangle_slots_make(index, part->info.epoch, shown, diag, &part->slots);
         for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++)
@@ -179,6 +194,7 @@ void pal_stream_close(pal_stream *stream)
     if (!stream) return;
     for (int p = 0; p < stream->n_part; p++) {
         pal_packet_drop(stream->part[p].asset);
+        pal_packet_drop(stream->part[p].image);
         pal_triangle_slots_free(stream->part[p].slots);
         drop_fields(&stream->part[p]);
         for (int t = 0; t < PAL_STREAM_TIER_COUNT; t++) {
@@ -561,6 +577,7 @@ void pal_stream_hello(const pal_stream *stream, pal_wire_hello *out)
         out->up[c] = scene->up[c];
         size += pow(stream->box_max_m[c] - stream->box_min_m[c], 2);
     }
+    pal_plain_text(out->anatomical_axes, sizeof out->anatomical_axes, scene->anatomical_axes);
     out->n_part = (uint32_t)stream->n_part;
     for (int p = 0; p < stream->n_part; p++) out->part[p] = stream->part[p].info;
     out->n_tool = (uint32_t)scene->n_tool;

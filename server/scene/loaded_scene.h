@@ -2,6 +2,7 @@
  * this room: it knows none of the other files. Thread: [load]. */
 #ifndef PAL_SCENE_LOADED_SCENE_H
 #define PAL_SCENE_LOADED_SCENE_H
+#include "server/mesh/geometry/image_map.h"
 #include "server/mesh/geometry/levels.h"
 #include "server/mesh/volume/loose_components.h"
 #include "server/sim/core/definition.h"
@@ -20,6 +21,7 @@ typedef struct pal_loaded_scene {
     pal_cells cells[PAL_BODY_MAX];            /* control cells about the body's origin; of another model none   */
     pal_stroke *stroke[PAL_BODY_MAX];         /* what a body's strokes borrow, from malloc; NULL: none          */
     double *spring_grid[PAL_BODY_MAX];        /* what a body's spring_grid borrows, from malloc; NULL: none */
+    pal_image image[PAL_BODY_MAX];            /* shown on the bodies; bytes NULL: none */
     pal_loose_components loose[PAL_BODY_MAX]; /* components left out because nothing holds them */
     int n_mesh;
 } pal_loaded_scene;
@@ -36,8 +38,13 @@ typedef struct pal_surface_scene {
     pal_material material; /* young_Pa 0: the default material                 */
     bool largest_only;     /* keep only the largest of several components         */
     double up[3];          /* unit, away from the ground; 0 0 0: (0, 0, 1)            */
-    double hold;           /* lowest part of the height held in place; 0: 0.05, of cells
-                            * more where that is not an eighth of the control vertices     */
+    char axes[PAL_AXES_BYTES]; /* where x, y and z point in the patient, "LPS"; "": as the scan says, if it does */
+    bool no_image;             /* of pal_scene_from_surface: leave the image of an OBJ file out */
+    pal_image_map *image;      /* becomes where an image lies on an OBJ file's surface; NULL: none is shown */
+    const char *appearance;    /* a word of PAL_APPEARANCES; NULL: the name of the file or shape where it is one, else
+                                * plastic for control cells and none for others */
+    double hold;               /* lowest part of the height held in place; 0: 0.05, of cells
+                                * more where that is not an eighth of the control vertices     */
     bool
         gravity; /* add the effect; a scanned shape is in equilibrium with its weight already, so the default is none */
     bool area_springs; /* add the component face_area; without it edges and volumes take its share */
@@ -61,10 +68,12 @@ typedef struct pal_surface_scene_report {
     double unit_m;
     const char *unit_name; /* "mm", "m", "given", ... */
     bool unit_guessed;     /* not given: derived from the size */
+    char image[160];       /* which image is shown, or why none that the file names; "": it names none */
     double read_s;
     int resolution;
-    int label;   /* of a label volume, -1: a surface                */
-    int n_label; /* labels it holds beside 0, at most 64 are counted */
+    int label;                 /* of a label volume, -1: a surface                */
+    char axes[PAL_AXES_BYTES]; /* given, or of the scan; "": not known */
+    int n_label;               /* labels it holds beside 0, at most 64 are counted */
     /* of model adaptive_springs, all its levels; n_level 0: another model */
     int n_level, n_node[PAL_LEVELS_MAX], n_spring[PAL_LEVELS_MAX];
     int n_piece, n_open_edge;           /* pieces without a common edge; 0 open edges: closed      */

@@ -2,8 +2,10 @@
  * that belong to the simulation are checked by pal_scene_check at the end. */
 #include "server/scene/scene_file.h"
 
+#include "server/base/flags.h"
 #include "server/base/heap.h"
 #include "server/mesh/files/mesh_file.h"
+#include "server/mesh/volume/image_seams.h"
 #include "server/scene/json_reader.h"
 #include "server/scene/region_file.h"
 #include "server/scene/scene_import.h"
@@ -99,7 +101,9 @@ static pal_err read_support(const pal_json *at, pal_support_def *out)
     return pal_json_box(&box, "low_m", "high_m", out->low_m, out->high_m);
 }
 
-static pal_err read_mesh(const pal_json *at, const pal_config_entry *model, pal_prepared *out)
+/* axes: of the scene; "" becomes that of a scan that states it */
+static pal_err read_mesh(const pal_json *at, const pal_config_entry *model, char axes[PAL_AXES_BYTES],
+                         pal_prepared *out)
 {
     char units[16] = "", file[FOLDER + FOLDER / 2];
     bool has_mesh = pal_json_has(at, "mesh");
@@ -129,9 +133,27 @@ static pal_err read_mesh(const pal_json *at, const pal_config_entry *model, pal_
         PAL_TRY(pal_json_text(at, "units", false, units, sizeof units));
         options.unit_m = *units ? pal_mesh_unit_named(units) : 0;
         if (*units && options.unit_m == 0) return pal_json_refuse_key(at, "units", "is not m, cm, mm, um or in");
-        err = pal_scene_prepare_file(file, &options, out, NULL, &reason);
+        pal_surface_scene_report report = {0};
+        pal_image_map map = {0};
+        memcpy(options.axes, axes, PAL_AXES_BYTES);
+        if (pal_json_has(at, "image")) options.image = &map;
+        err = pal_scene_prepare_file(file, &options, out, &report, &reason);
+        if (!err && map.n_tri) err = pal_image_seams_make(&map, out, &reason);
+        pal_image_map_free(&map);
+        if (!err) memcpy(axes, report.axes, PAL_AXES_BYTES);
     }
     return pal_json_forward(at, key, err, &reason);
+}
+
+static pal_err read_image(const pal_json *at, const pal_prepared *mesh, pal_image *out)
+{
+    char file[FOLDER + FOLDER / 2];
+    pal_diagnostic reason = {""};
+    if (!pal_json_has(at, "image")) return PAL_ERR_OK;
+    PAL_TRY(pal_json_file_name(at, "image", file, sizeof file));
+    if (!mesh->surface.uv)
+        return pal_json_refuse_key(at, "image", "the surface has no image coordinates, as vt of an OBJ file");
+    return pal_json_forward(at, "image", pal_image_read(file, out, &reason), &reason);
 }
 
 static pal_err read_lists(const pal_json *at, pal_body_def *body)
@@ -149,6 +171,18 @@ static pal_err read_lists(const pal_json *at, pal_body_def *body)
     return PAL_ERR_OK;
 }
 
+static pal_err read_look(const pal_json *at, pal_body_def *body)
+{
+    const char *digits = body->colour + 1;
+    PAL_TRY(pal_json_text(at, "appearance", false, body->appearance, sizeof body->appearance));
+    if (body->appearance[0] && pal_flag_word(PAL_APPEARANCES, body->appearance) < 0)
+        return pal_json_refuse_key(at, "appearance", "\"%s\" is not one of %s", body->appearance, PAL_APPEARANCES);
+    PAL_TRY(pal_json_text(at, "colour", false, body->colour, sizeof body->colour));
+    if (body->colour[0] && (body->colour[0] != '#' || strspn(digits, "0123456789abcdefABCDEF") != 6))
+        return pal_json_refuse_key(at, "colour", "\"%s\" is not a colour as #82352b", body->colour);
+    return PAL_ERR_OK;
+}
+
 static pal_err read_body(const pal_json *at, int index, pal_loaded_scene *scene)
 {
     char name[PAL_NAME];
@@ -162,6 +196,7 @@ static pal_err read_body(const pal_json *at, int index, pal_loaded_scene *scene)
     else
         pal_body_default(body, name, &scene->mesh[index]);
     if (!solid && pal_json_has(at, "origin_m")) return pal_json_refuse(at, "origin_m only goes with cells");
+    PAL_TRY(read_look(at, body));
     PAL_TRY(read_material(at, &body->material));
     PAL_TRY(read_model(at, scene, index));
     PAL_TRY(read_item_at(at, "solver", &body->solver));
@@ -172,7 +207,9 @@ static pal_err read_body(const pal_json *at, int index, pal_loaded_scene *scene)
     if (solid)
         PAL_TRY(pal_subdivision_read(at, scene, index));
     else
-        PAL_TRY(read_mesh(at, &body->model, &scene->mesh[index]));
+        PAL_TRY(read_mesh(at, &body->model, scene->scene.anatomical_axes, &scene->mesh[index]));
+    PAL_TRY(read_image(at, &scene->mesh[index], &scene->image[index]));
+    if (scene->image[index].bytes) body->image = &scene->image[index];
     scene->n_mesh = index + 1;
     PAL_TRY(pal_json_bool(at, "largest", &largest_only));
     pal_diagnostic reason = {""};
@@ -257,6 +294,16 @@ static pal_err read_target(const pal_json *root, pal_scene *scene)
     return scene->budget_ms > 0 ? PAL_ERR_OK : pal_json_refuse(&budget, "has no step_ms");
 }
 
+static pal_err read_axes(const pal_json *at, char axes[PAL_AXES_BYTES])
+{
+    char text[16] = "";
+    PAL_TRY(pal_json_text(at, "anatomical_axes", false, text, sizeof text));
+    const char *fault = pal_anatomical_axes_fault(text);
+    if (fault) return pal_json_refuse_key(at, "anatomical_axes", "%s %s", text, fault);
+    snprintf(axes, PAL_AXES_BYTES, "%.3s", text);
+    return PAL_ERR_OK;
+}
+
 static pal_err read_scene(const pal_json *at, pal_loaded_scene *loaded)
 {
     pal_scene *scene = &loaded->scene;
@@ -275,6 +322,7 @@ static pal_err read_scene(const pal_json *at, pal_loaded_scene *loaded)
     PAL_TRY(pal_json_bool(at, "keep_real_time", &scene->keep_real_time));
     PAL_TRY(pal_json_count(at, "max_substep", 1, 1000000, &scene->max_substep));
     PAL_TRY(pal_json_vector(at, "up", scene->up));
+    PAL_TRY(read_axes(at, scene->anatomical_axes));
     PAL_TRY(read_tools(at, scene));
     PAL_TRY(pal_json_list(at, "bodies", PAL_BODY_MAX, &list));
     if (!list.value || !list.value->child) return pal_json_refuse(&list, "a scene needs at least one body");
@@ -320,6 +368,7 @@ void pal_scene_free(pal_loaded_scene *loaded)
         for (int r = 0; r < PAL_REGION_MAX; r++) PAL_FREE(loaded->region[k][r].label, loaded->region[k][r].grid);
         PAL_FREE(loaded->spring_grid[k], loaded->stroke[k]);
         pal_cells_free(&loaded->cells[k]);
+        pal_image_free(&loaded->image[k]);
         pal_prepared_free(&loaded->mesh[k]);
     }
     free(loaded);

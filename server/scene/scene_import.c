@@ -9,6 +9,7 @@
 #include "server/scene/scene_import.h"
 
 #include "server/base/clock.h"
+#include "server/base/flags.h"
 #include "server/base/utf8.h"
 #include "server/base/vec3.h"
 #include "server/mesh/files/mesh_file.h"
@@ -162,8 +163,11 @@ static pal_err read_volume(const char *path, const pal_surface_scene *options, p
     report_progress(options, "label", 0);
     int n = pal_label_volume_list(&volume, count, LABELS);
     snprintf(report->surface.place, sizeof report->surface.place, "byte %lld", (long long)volume.first_byte);
-    pal_err err =
-        n > 0 ? PAL_ERR_OK : PAL_REFUSE(diag, "%s: %s: the volume holds no label but 0", path, report->surface.place);
+    const bool other = volume.axes[0] && options->axes[0] && strcmp(volume.axes, options->axes) != 0;
+    if (!options->axes[0]) snprintf(report->axes, sizeof report->axes, "%s", volume.axes);
+    pal_err err = other ? PAL_REFUSE(diag, "%s: the axes of the scan are %s, not %s", path, volume.axes, options->axes)
+                  : n > 0 ? PAL_ERR_OK
+                          : PAL_REFUSE(diag, "%s: %s: the volume holds no label but 0", path, report->surface.place);
     if (!err) {
         int wanted = options->adaptive ? PAL_COARSE_TRI : PAL_WANTED_TRI;
         pal_label_surface_options surface = {
@@ -188,6 +192,7 @@ static pal_err read_any(const char *path, const pal_surface_scene *options, pal_
     struct stat facts;
     report_progress(options, "read", 0);
     report->label = -1;
+    snprintf(report->axes, sizeof report->axes, "%s", options->axes);
     /* a pipe or device would be waited for */
     if (stat(path, &facts)) return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s", path, strerror(errno));
     if (!S_ISREG(facts.st_mode)) return PAL_REFUSE(diag, "%s: not a file", path);
@@ -201,7 +206,7 @@ static pal_err read_any(const char *path, const pal_surface_scene *options, pal_
     } else if (options->label > 0) {
         err = PAL_REFUSE(diag, "%s: label %d is wanted, but this is not a label volume", path, options->label);
     } else {
-        pal_mesh_file_options file = {.unit_m = options->unit_m, .weld = PAL_MESH_WELD};
+        pal_mesh_file_options file = {.unit_m = options->unit_m, .weld = PAL_MESH_WELD, .image = options->image};
         report->unit_guessed = options->unit_m == 0;
         err = pal_mesh_file_read(path, &file, out, &report->surface, &report->unit_m, &report->unit_name, diag);
     }
@@ -315,6 +320,11 @@ static pal_err make_body(pal_loaded_scene *loaded, const char *name, const pal_s
         pal_body_default_cells(body, plain, &loaded->mesh[0], cells);
     else
         pal_body_default(body, plain, &loaded->mesh[0]);
+    const char *look = options->appearance                          ? options->appearance
+                       : pal_flag_word(PAL_APPEARANCES, plain) >= 0 ? plain
+                       : cells                                      ? "plastic"
+                                                                    : "";
+    snprintf(body->appearance, sizeof body->appearance, "%.15s", look);
     if (!options->gravity) leave_gravity_out(body);
     /* as many levels as run in real time; cells that are no hexahedra need one */
     const int n_level = options->n_level                                     ? options->n_level
@@ -325,9 +335,11 @@ static pal_err make_body(pal_loaded_scene *loaded, const char *name, const pal_s
     /* a body at rest costs nothing until it is touched */
     pal_entry_init(&body->effect[body->n_effect++], "", "sleep");
     for (int k = 0; k < body->n_effect; k++) snprintf(body->effect[k].path, PAL_ENTRY_TEXT, "bodies[0].effects[%d]", k);
+    if (loaded->image[0].bytes) body->image = &loaded->image[0];
     if (options->material.young_Pa > 0) body->material = options->material;
     scene->n_body = 1;
     if (pal_norm3(options->up) > 0) pal_copy3(scene->up, options->up);
+    snprintf(scene->anatomical_axes, sizeof scene->anatomical_axes, "%s", report ? report->axes : options->axes);
     if (options->hold > 0)
         body->support[0].fraction = options->hold;
     else if (cells)
@@ -445,7 +457,12 @@ pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *option
     if (!loaded) return PAL_ERR_MEMORY;
     char stem[256];
     pal_scene_stem(path, stem, sizeof stem);
-    pal_err err = pal_scene_prepare_file(path, options, &loaded->mesh[0], report, diag);
+    pal_image_map map = {0};
+    pal_surface_scene all = *options;
+    if (!options->no_image) all.image = &map;
+    pal_err err = pal_scene_prepare_file(path, &all, &loaded->mesh[0], report, diag);
+    if (!err && map.n_tri) err = pal_scene_take_image(path, &map, loaded, report, diag);
+    pal_image_map_free(&map);
     pal_diagnostic reason = {""};
     report_progress(options, "levels", 0);
     if (!err && options->adaptive) err = pal_scene_adaptive_inspect(&loaded->mesh[0].surface, options, report, &reason);
@@ -508,6 +525,7 @@ pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene 
     report->read_s = pal_clock_s() - start;
     report->unit_m = 1;
     report->unit_name = "m";
+    snprintf(report->axes, sizeof report->axes, "%s", options->axes);
     snprintf(report->surface.format, sizeof report->surface.format, "procedural");
     report->surface.n_vertex_read = shape.surface.n_vertex;
     report->surface.n_tri_read = shape.surface.n_tri;
@@ -519,6 +537,9 @@ pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene 
     if (err && reason.text[0]) pal_diagnostic_set(diag, err, "%s: %s", name, reason.text);
     pal_surface_free(&shape.surface);
     if (!err) err = make_body(loaded, shape.name, options, report, diag);
+    pal_body_def *body = &loaded->scene.body[0];
+    if (!body->appearance[0] && !strcmp(shape.name, "organ"))
+        snprintf(body->appearance, sizeof body->appearance, "liver");
     if (!err) err = apply_shape(&loaded->scene, &shape, options, diag);
     if (!err) err = drop_loose(loaded, options, report, diag);
     if (err) {

@@ -38,6 +38,19 @@ static void mesh_name(const pal_scene *scene, int body, char out[MESH_NAME])
     snprintf(out + n, MESH_NAME - n, scene->body[body].cells ? ".palcells" : ".palmesh");
 }
 
+/* another surface than that of the file, as control cells have, has no place for an image */
+static bool shows_image(const pal_body_def *body)
+{
+    return body->image && !body->cells && body->mesh->surface.uv;
+}
+
+static void image_name(const pal_scene *scene, int body, char out[MESH_NAME])
+{
+    stem_of(scene, body, out);
+    size_t n = strlen(out);
+    snprintf(out + n, MESH_NAME - n, "%s", scene->body[body].image->ending);
+}
+
 static cJSON *entry_json(const pal_config_entry *item)
 {
     cJSON *object = PAL_JSON({"name", JSON_TEXT(item->name)});
@@ -72,6 +85,13 @@ static cJSON *body_json(const pal_scene *scene, int index)
     pal_spring_grid_append(model, &body->spring_grid);
     mesh_name(scene, index, name);
     cJSON *object = PAL_JSON({"name", JSON_TEXT(body->name)}, {"mesh", body->cells ? NULL : JSON_TEXT(name)});
+    if (shows_image(body)) {
+        image_name(scene, index, name);
+        PAL_JSON_ADD(object, {"image", JSON_TEXT(name)});
+        mesh_name(scene, index, name);
+    }
+    if (body->appearance[0]) PAL_JSON_ADD(object, {"appearance", JSON_TEXT(body->appearance)});
+    if (body->colour[0]) PAL_JSON_ADD(object, {"colour", JSON_TEXT(body->colour)});
     if (body->cells) pal_subdivision_append(object, body, name);
     PAL_JSON_ADD(object, {"material",
                           PAL_JSON({"young_Pa", pal_json_exact(m->young_Pa)}, {"poisson", pal_json_exact(m->poisson)},
@@ -125,6 +145,7 @@ static char *scene_text(const pal_scene *scene)
     cJSON *root = PAL_JSON({"name", JSON_TEXT(scene->name)}, {"title", JSON_TEXT(scene->title)},
                            {"source", JSON_TEXT(scene->source)}, {"accuracy", accuracy}, {"budget", budget},
                            {"step_s", pal_json_exact(scene->step_s)}, {"up", pal_json_exact_list(scene->up, 3)},
+                           {"anatomical_axes", scene->anatomical_axes[0] ? JSON_TEXT(scene->anatomical_axes) : NULL},
                            {"gravity_m_s2", gravity_acts(scene) ? pal_json_exact(scene->gravity_m_s2) : NULL},
                            {"max_substep", pal_json_exact(scene->max_substep)}, {"bodies", bodies}, {"tools", tools});
     if (scene->keep_real_time) cJSON_AddTrueToObject(root, "keep_real_time");
@@ -153,8 +174,22 @@ pal_err pal_scene_make_folder(const char *folder, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
-/* meshes and label volumes of all bodies, of which the first n_file are written, or removed again; *n_done: how many
- * were before an error */
+enum { IMAGE = -2, MESH = -1 }; /* files of a body, and its regions from 0 */
+
+static bool has_file(const pal_body_def *body, int file)
+{
+    return file == IMAGE ? shows_image(body) : file == MESH || body->region[file].kind == PAL_REGION_LABEL;
+}
+
+static pal_err write_file(const pal_body_def *body, int file, const char *path, pal_diagnostic *diag)
+{
+    if (file == IMAGE) return pal_file_write(path, body->image->bytes, body->image->n_byte, diag);
+    if (file >= 0) return pal_region_write(body, file, path, diag);
+    return body->cells ? pal_cell_file_save(body->cells, path, diag) : pal_prepared_save(body->mesh, path, diag);
+}
+
+/* images, meshes and label volumes of all bodies, of which the first n_file are written, or removed again; *n_done: how
+ * many were before an error */
 static pal_err each_file(const pal_scene *scene, const char *folder, bool written, int n_file, int *n_done,
                          pal_diagnostic *diag)
 {
@@ -162,21 +197,18 @@ static pal_err each_file(const pal_scene *scene, const char *folder, bool writte
     *n_done = 0;
     for (int b = 0; b < scene->n_body; b++) {
         const pal_body_def *body = &scene->body[b];
-        for (int k = -1; k < body->n_region; k++) {
-            if (k >= 0 && body->region[k].kind != PAL_REGION_LABEL) continue;
+        for (int k = IMAGE; k < body->n_region; k++) {
+            if (!has_file(body, k)) continue;
             if (*n_done == n_file) return PAL_ERR_OK;
             stem_of(scene, b, name);
             pal_region_volume(name, k, volume, sizeof volume);
-            if (k < 0) mesh_name(scene, b, name);
+            if (k == IMAGE) image_name(scene, b, name);
+            if (k == MESH) mesh_name(scene, b, name);
             snprintf(path, sizeof path, "%s/%s", folder, k < 0 ? name : volume);
-            if (!written)
-                unlink(path);
-            else if (k >= 0)
-                PAL_TRY(pal_region_write(body, k, path, diag));
-            else if (body->cells)
-                PAL_TRY(pal_cell_file_save(body->cells, path, diag));
+            if (written)
+                PAL_TRY(write_file(body, k, path, diag));
             else
-                PAL_TRY(pal_prepared_save(body->mesh, path, diag));
+                unlink(path);
             ++*n_done;
         }
     }

@@ -96,12 +96,18 @@ static pal_err index_all(pal_recording *r, pal_diagnostic *diag)
     double next_step_s = 0;
     if (!add_span(r, 0, 0, r->scene->step_s)) return PAL_ERR_MEMORY;
     for (size_t at = PAL_INPUT_HEADER; at < r->n_byte;) {
+        const size_t begin = at;
         PAL_TRY(pal_input_get_record(r->name, r->bytes, r->n_byte, &at, &record, diag));
         const char *text = text_of(&record);
         const bool change = record.kind == PAL_INPUT_SCULPT || record.kind == PAL_INPUT_SWITCH,
                    state = record.kind == PAL_INPUT_STATE && record.index == r->scene->n_body - 1;
         bool good = !text || add_mark(r, record.step, text);
-        if (record.kind == PAL_INPUT_PREPARE) next_step_s = record.configuration.step_s;
+        if (record.kind == PAL_INPUT_PREPARE) {
+            next_step_s = record.configuration.step_s; /* 0: as it is */
+            if (next_step_s != 0 && !(next_step_s >= PAL_STEP_MIN_S && next_step_s <= PAL_STEP_MAX_S))
+                return PAL_REFUSE(diag, "%s: byte %zu: a step of %g s is outside %g .. %g", r->name, begin, next_step_s,
+                                  PAL_STEP_MIN_S, PAL_STEP_MAX_S);
+        }
         if (record.kind == PAL_INPUT_SWITCH && next_step_s > 0)
             good = good && add_span(r, record.step, pal_recording_time_s(r, record.step), next_step_s);
         if (change || state) good = good && add_state(r, record.step | (change ? CHANGE : 0));

@@ -1,4 +1,4 @@
-/* The struct of a session, shared by session_thread.c and session_transfer.c. Private to them. */
+/* The struct of a session, shared by session_thread.c, session_play.c and session_transfer.c. Private to them. */
 #ifndef PAL_SESSION_SESSION_CORE_H
 #define PAL_SESSION_SESSION_CORE_H
 #include "server/base/command_queue.h"
@@ -105,6 +105,11 @@ static inline uint64_t session_now_ns(const pal_session *s)
     return pal_clock_now_ns(s->options.clock);
 }
 
+/* [sim] the newest diagnostic, for any thread to read */
+void pal_session_put_diagnostic(pal_session *session, const pal_diagnostic *diag);
+/* [sim] Takes the records of the recording that precede its next step (session_play.c); true: one changed the world. A
+ * record that the world refuses ends it */
+bool pal_session_play(pal_session *session);
 /* for the thread that opens, transfers and closes; INTERNAL: the thread could not be started */
 pal_err pal_session_start(pal_session *session, pal_diagnostic *diag);
 void pal_session_stop(pal_session *session); /* between two steps; waits for the thread */

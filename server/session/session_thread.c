@@ -19,7 +19,7 @@
 
 /* ---- the thread ---- */
 
-static void put_diagnostic(pal_session *s, const pal_diagnostic *diag)
+void pal_session_put_diagnostic(pal_session *s, const pal_diagnostic *diag)
 {
     pthread_mutex_lock(&s->lock);
     s->diag = *diag;
@@ -141,7 +141,7 @@ static void subscribe(pal_session *s, const pal_command *command)
     if (!command->wanted && *n > 0) return;
     if (!pal_world_field(s->world, command->body, command->field, command->wanted, &diag)) return;
     count_refusal(s);
-    put_diagnostic(s, &diag);
+    pal_session_put_diagnostic(s, &diag);
 }
 
 /* true: observation began, so display data must be computed */
@@ -235,52 +235,6 @@ static void execute(pal_session *s, const pal_command *command)
     }
 }
 
-/* Takes the records of a recording that precede its next step; true: one changed the world. A record that the world
- * refuses ends it */
-static bool play(pal_session *s)
-{
-    pal_playing now = s->playing; /* no other thread writes it */
-    bool changed = false;
-    now.step = s->play_step, now.speed = s->speed;
-    now.state = s->play_at < s->n_play ? PAL_PLAYS : PAL_PLAYS_END;
-    while (now.state == PAL_PLAYS && s->play_at < s->n_play) {
-        pal_input_record record;
-        pal_diagnostic diag = {""};
-        size_t at = s->play_at;
-        pal_err err = pal_input_get_record("the recording", s->play, s->n_play, &at, &record, &diag);
-        if (!err && record.step > s->play_step) break;
-        const bool hash = record.kind == PAL_INPUT_HASH || record.kind == PAL_INPUT_END;
-        if (record.kind == PAL_INPUT_SCULPT || record.kind == PAL_INPUT_SWITCH) {
-            now.state = PAL_PLAYS_CHANGE;
-            break;
-        }
-        if (!err && hash) {
-            now.n_hash++;
-            now.n_hash_equal += pal_world_hash(s->world) == record.hash;
-        } else if (!err && (record.kind <= PAL_INPUT_COMPONENT)) {
-            err = pal_input_apply(s->world, s->scene, &record, &diag);
-            if (record.kind == PAL_INPUT_POSE) s->tool[record.index].arrived_ns = session_now_ns(s);
-            changed = true;
-        }
-        if (!err && record.kind == PAL_INPUT_MATERIAL) {
-            pthread_mutex_lock(&s->lock);
-            s->material[record.index] = record.material;
-            pthread_mutex_unlock(&s->lock);
-        }
-        if (err) put_diagnostic(s, &diag);
-        s->play_at = at;
-        if (err || s->play_at == s->n_play) now.state = PAL_PLAYS_END;
-    }
-    if (now.state == PAL_PLAYS_END) s->play_at = s->n_play;
-    changed |= now.state == PAL_PLAYS_CHANGE; /* reminds who has to go past it */
-    if (!memcmp(&now, &s->playing, sizeof now)) return changed;
-    pthread_mutex_lock(&s->lock);
-    changed |= now.state != s->playing.state;
-    s->playing = now;
-    pthread_mutex_unlock(&s->lock);
-    return changed;
-}
-
 static bool take_commands(pal_session *s)
 {
     pal_command command;
@@ -302,7 +256,7 @@ static void report_error(pal_session *s, pal_err err)
         if (body->frozen)
             (void)snprintf(diag.text + used, sizeof diag.text - used, "; %s: %s", body->name, body->reason);
     }
-    put_diagnostic(s, &diag);
+    pal_session_put_diagnostic(s, &diag);
 }
 
 static void time_substep(pal_session *s)
@@ -349,7 +303,7 @@ static void estimate(pal_session *s, bool stepped)
 {
     pal_diagnostic diag = {""};
     double step_ms = stepped ? 1e-6 * (double)s->work_ns : (double)NAN;
-    if (pal_estimator_set_step(&s->estimators, s->world, step_ms, &diag)) put_diagnostic(s, &diag);
+    if (pal_estimator_set_step(&s->estimators, s->world, step_ms, &diag)) pal_session_put_diagnostic(s, &diag);
 }
 
 static bool is_stopped(const pal_session *s)
@@ -382,7 +336,7 @@ static void *simulate(void *user)
         bool changed = take_commands(s);
         uint64_t now = session_now_ns(s);
         atomic_store_explicit(&s->beat_ns, now, memory_order_relaxed);
-        changed = (s->play ? play(s) : take_poses(s, now)) || changed;
+        changed = (s->play ? pal_session_play(s) : take_poses(s, now)) || changed;
         changed = update_observed(s) || changed;
         bool moves = (!s->paused || s->single > 0) && (!s->play || s->playing.state == PAL_PLAYS);
         if (moves) {
@@ -607,13 +561,6 @@ static pal_err refuse(pal_session *s)
 {
     count_refusal(s);
     return PAL_ERR_REFUSED;
-}
-
-void pal_session_playing(pal_session *s, pal_playing *out)
-{
-    pthread_mutex_lock(&s->lock);
-    *out = s->playing;
-    pthread_mutex_unlock(&s->lock);
 }
 
 pal_err pal_session_request_pose(pal_session *s, int tool, const pal_pose *pose)

@@ -94,6 +94,11 @@ await run(async () => {
     check("effects have plain names, with that of the code as tooltip", /^Contact/.test(push?.[1] ?? ""), String(push));
     await ada.keyboard.press("Escape");
     check("Escape closes the panel", await ada.locator("#panel").isHidden());
+    await ada.keyboard.press("5");
+    await ada.waitForSelector("#plots canvas");
+    found = await findings(ada);
+    check("nor on the page with its plots", found.length === 0, found.join(" | "));
+    await ada.keyboard.press("Escape");
     await ada.keyboard.press("?");
     found = await findings(ada);
     check("nor in the help", found.length === 0, found.join(" | "));
@@ -107,8 +112,10 @@ await run(async () => {
         ["a page at 200 %", 640, 360],
     ]) {
         await ada.setViewportSize({ width, height });
-        for (const id of ["panel-toggle", "accuracy-toggle"]) {
+        for (const id of ["panel-toggle", "accuracy-toggle", "plots-toggle"]) {
             await ada.click(`#${id}`);
+            // loaded when they first open
+            if (id === "plots-toggle") await ada.waitForSelector("#plots canvas");
             await nextFrame(ada);
             await nextFrame(ada);
             const px = await hidden(ada);

@@ -54,7 +54,7 @@ const LIVER = "data/images/liver.inr.gz";
 /** scene of the liver of the CT, else of the procedural organ; coarse, so that it is fast beside two software renderers */
 export function prepare() {
     const folder = join(scratch, "organ");
-    const size = ["--resolution", "14", "--triangles", "12000", "-o", folder, "--quiet"];
+    const size = ["--resolution", "14", "--triangles", "12000", "--axes", "LPS", "-o", folder, "--quiet"];
     if (existsSync(SCAN)) {
         execFileSync("tar", ["-xzf", SCAN, "-C", scratch, LIVER]);
         execFileSync(palpate, [

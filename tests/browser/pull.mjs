@@ -20,22 +20,44 @@ import {
     until,
 } from "./common.mjs";
 
-/** share of the picture that an instrument covers: the pixels that change when it is hidden */
-const coverage = (page, index) =>
+/** share of the picture, or of a square of 8 pixels about one, that changes when an instrument is hidden */
+const coverage = (page, index, middle = null) =>
+    page.evaluate(
+        ([tool, at]) => {
+            const { marks, stage } = window.palpate;
+            const gl = stage.renderer.getContext();
+            stage.applySize();
+            const { clientWidth, height, width } = stage.canvas;
+            const scale = width / clientWidth;
+            const box = at
+                ? [at.x * scale - 4, height - at.y * scale - 4, 8, 8].map(Math.round)
+                : [0, 0, width, height];
+            const [shown, hidden] = [true, false].map((visible) => {
+                marks.marks[tool].instrument.group.visible = visible;
+                stage.dirty = true;
+                stage.draw();
+                const bytes = new Uint8Array(4 * box[2] * box[3]);
+                gl.readPixels(...box, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+                return bytes;
+            });
+            const changed = (_, i) => [0, 1, 2].some((k) => Math.abs(shown[4 * i + k] - hidden[4 * i + k]) > 12);
+            return Array.from({ length: box[2] * box[3] }, changed).filter(Boolean).length / (box[2] * box[3]);
+        },
+        [index, middle],
+    );
+/** turns the view until tissue hides the tip of an instrument; its pixel */
+const hideTip = (page, index) =>
     page.evaluate((tool) => {
-        const { marks, stage } = window.palpate;
-        const gl = stage.renderer.getContext();
-        const { width, height } = stage.canvas;
-        const [shown, hidden] = [true, false].map((visible) => {
-            marks.marks[tool].instrument.group.visible = visible;
-            stage.dirty = true;
-            stage.draw();
-            const bytes = new Uint8Array(4 * width * height);
-            gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
-            return bytes;
-        });
-        const changed = (_, i) => [0, 1, 2].some((k) => Math.abs(shown[4 * i + k] - hidden[4 * i + k]) > 20);
-        return Array.from({ length: width * height }, changed).filter(Boolean).length / (width * height);
+        const { input, marks, stage } = window.palpate;
+        const tip = marks.marks[tool].ball.position;
+        for (let k = 0; k < 24; k++) {
+            stage.azimuth += Math.PI / 12;
+            stage.placeCamera();
+            const pixel = stage.project(tip);
+            const hit = input.pick(stage.ray(pixel.x, pixel.y));
+            if (hit && hit.distance < tip.distanceTo(stage.camera.position) - 0.01) return pixel;
+        }
+        return null;
     }, index);
 const ended = (child) => new Promise((resolve) => child.on("exit", (code) => resolve(code)));
 
@@ -64,6 +86,16 @@ await run(async () => {
         holders[0] >= 0 && holders[1] >= 0 && holders[0] !== holders[1],
         holders.join(" "),
     );
+
+    const cube = ada.locator("#orientation");
+    const seen = await cube.getAttribute("aria-label");
+    check("the cube of the patient's directions says from where the organ is seen", /seen from the/.test(seen), seen);
+    const turned = () => cube.locator("> div").evaluate((element) => element.style.transform);
+    const turnedBefore = await turned();
+    await ada.evaluate(() => window.palpate.stage.orbit(200, 0));
+    await until(turned, (now) => now !== turnedBefore);
+    check("and turns with the view", (await turned()) !== turnedBefore);
+    await ada.evaluate(() => window.palpate.stage.home());
 
     // the organ settles under its weight
     const before = await settled(ben, () => 0.0005, 1.5);
@@ -164,6 +196,22 @@ await run(async () => {
     check("its tip is at the tool", closed.apart < 1e-4, `${(1e6 * closed.apart).toFixed(0)} um`);
     const covered = await coverage(ben, holders[0]);
     check("and is drawn", covered > 0.002 && covered < 0.2, `${(100 * covered).toFixed(2)} % of the picture`);
+    const roll = (page) =>
+        page.evaluate((index) => window.palpate.marks.marks[index].instrument.group.quaternion.toArray(), holders[0]);
+    const straight = await roll(ben);
+    for (let k = 0; k < 3; k++) await ada.keyboard.press("w");
+    // three turns of 15 degrees; the shaft stays where it is
+    const turn = (a, b) =>
+        (2 * Math.acos(Math.min(1, Math.abs(a.reduce((s, v, k) => s + v * b[k], 0)))) * 180) / Math.PI;
+    const turned = await until(
+        async () => turn(await roll(ben), straight),
+        (angle) => Math.abs(angle - 45) < 1,
+    );
+    check("it turns about its shaft by keys", Math.abs(turned - 45) < 1, `${turned.toFixed(1)} degrees`);
+    const behind = await hideTip(ben, holders[0]);
+    const through = behind ? await coverage(ben, holders[0], behind) : 0;
+    check("also through the tissue that hides its tip", through > 0.05, `${(100 * through).toFixed(0)} % there`);
+    await ben.evaluate(() => window.palpate.stage.home());
     const label = await until(
         () =>
             ben.evaluate(() =>

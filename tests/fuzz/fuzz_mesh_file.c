@@ -1,6 +1,7 @@
 /* The surface readers on any bytes: the first byte of the input chooses the name, and with it the reader of last
  * resort; the rest is the file. */
 #include "server/mesh/files/mesh_file.h"
+#include "server/mesh/volume/image_seams.h"
 
 #include <stdint.h>
 
@@ -15,8 +16,18 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
     pal_surface_topology topology;
     pal_diagnostic diag;
     double unit_m;
-    if (pal_mesh_file_parse(name[bytes[0] % 5], bytes + 1, n_byte - 1, NULL, &s, &report, &unit_m, NULL, &diag))
+    pal_image_map map = {0};
+    const pal_mesh_file_options options = {.weld = PAL_MESH_WELD, .image = &map};
+    if (pal_mesh_file_parse(name[bytes[0] % 5], bytes + 1, n_byte - 1, &options, &s, &report, &unit_m, NULL, &diag))
         return 0;
+    if (map.n_tri) {
+        pal_prepared mesh;
+        if (!pal_prepared_surface(&s, &mesh)) {
+            (void)pal_image_seams_make(&map, &mesh, &diag);
+            pal_prepared_free(&mesh);
+        }
+    }
+    pal_image_map_free(&map);
     /* what was accepted must be usable */
     (void)pal_surface_check(&s, &topology);
     for (int c = 0; c < 3 * s.n_tri; c++)

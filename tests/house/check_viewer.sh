@@ -12,6 +12,7 @@ types)
     # the served vendor folder does not exist in the tree: its types stand in for it, beside the sources by rootDirs
     mkdir -p "$packages/types/vendor"
     echo 'export * from "three";' >"$packages/types/vendor/three.module.min.d.ts"
+    echo 'import uPlot from "uplot"; export default uPlot;' >"$packages/types/vendor/uPlot.esm.d.ts"
     while read -r addon; do
         mkdir -p "$packages/types/vendor/addons/${addon%/*}"
         echo "export * from \"three/addons/$addon\";" >"$packages/types/vendor/addons/${addon%.js}.d.ts"

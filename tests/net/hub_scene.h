@@ -26,6 +26,7 @@ static inline bool small_scene_make(small_scene *s, const char *name)
     snprintf(s->scene.title, sizeof s->scene.title, "Small \"organ\"");
     snprintf(s->scene.source, sizeof s->scene.source, "made by the test");
     snprintf(s->scene.accuracy, sizeof s->scene.accuracy, "2 %% of \"truth\"");
+    snprintf(s->scene.anatomical_axes, sizeof s->scene.anatomical_axes, "LPS");
     s->scene.n_body = 1;
     pal_body_default(&s->scene.body[0], "organ", &s->mesh);
     pal_tools_default(&s->scene, 2);

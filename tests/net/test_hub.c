@@ -68,6 +68,7 @@ static void newcomer_gets_hello_members_frame_and_tools_in_this_order(void)
     CHECK_TEXT(hello->session, "small");
     CHECK_TEXT(hello->you_name, "Ada");
     CHECK_TEXT(hello->title, "Small \"organ\"");
+    CHECK_TEXT(hello->anatomical_axes, "LPS");
     CHECK_TEXT(hello->accuracy, "2 % of \"truth\"");
     CHECK(hello->you_id > 0 && hello->you_tool == 0 && hello->n_tool == 2 && hello->n_part == 1 &&
           hello->plan.n_component > 0);

@@ -175,12 +175,13 @@ static inline pal_topology_delta_head golden_topology_delta(void)
 }
 
 /* lines of control.jsonl behind one of each type: what servers and clients of before did not say */
-enum { GOLDEN_CONTROL_LINES = PAL_CONTROL_COUNT + 10 };
+enum { GOLDEN_CONTROL_LINES = PAL_CONTROL_COUNT + 11 };
 static inline pal_control_type golden_line_type(int line)
 {
-    static const pal_control_type more[] = {
-        PAL_CONTROL_HELLO, PAL_CONTROL_HELLO,    PAL_CONTROL_STATUS, PAL_CONTROL_JOIN,  PAL_CONTROL_HELLO,
-        PAL_CONTROL_HELLO, PAL_CONTROL_TOPOLOGY, PAL_CONTROL_STATUS, PAL_CONTROL_STUDY, PAL_CONTROL_ESTIMATE};
+    static const pal_control_type more[] = {PAL_CONTROL_HELLO,    PAL_CONTROL_HELLO,  PAL_CONTROL_STATUS,
+                                            PAL_CONTROL_JOIN,     PAL_CONTROL_HELLO,  PAL_CONTROL_HELLO,
+                                            PAL_CONTROL_TOPOLOGY, PAL_CONTROL_STATUS, PAL_CONTROL_STUDY,
+                                            PAL_CONTROL_ESTIMATE, PAL_CONTROL_HELLO};
     return line < PAL_CONTROL_COUNT ? (pal_control_type)line : more[line - PAL_CONTROL_COUNT];
 }
 
@@ -352,5 +353,9 @@ static inline void golden_line(int line, pal_control *c)
     if (line == PAL_CONTROL_COUNT + 7) golden_status(&c->status);
     if (line == PAL_CONTROL_COUNT + 8) golden_study(&c->study);
     if (line == PAL_CONTROL_COUNT + 9) golden_estimate(&c->estimate);
+    if (line == PAL_CONTROL_COUNT + 10) {
+        snprintf(c->hello.part[0].appearance, PAL_WIRE_LOOK_BYTES, "gall_bladder");
+        snprintf(c->hello.part[0].colour, PAL_WIRE_LOOK_BYTES, "#5c6f3a");
+    }
 }
 #endif

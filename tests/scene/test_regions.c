@@ -1,5 +1,5 @@
-/* Material regions in scene files: where each kind holds, that a saved scene has the same material at every point, and
- * the sentence of every fault. */
+/* Scans in scene files: where each kind of material region holds, that a saved scene has the same material at every
+ * point, the sentence of every fault, and the anatomical axes of a scan. */
 #include "server/scene/scene_file.h"
 #include "tests/check.h"
 #include "tests/session/session_scene.h"
@@ -198,6 +198,41 @@ static void every_bad_region_has_its_sentence(void)
     }
 }
 
+#define SCAN(more, surface) "{" more "\"bodies\": [{\"surface\": \"" surface "\", \"resolution\": 8}]}"
+
+static void a_scan_gives_its_anatomical_axes_and_no_others(void)
+{
+    const float axes[3][3] = {{-10, 0, 0}, {0, 20, 0}, {0, 0, 30}}, first[3] = {15, -15, 20};
+    uint8_t label[24];
+    memset(label, 1, sizeof label);
+    REQUIRE(write_scan("scan.nii", axes, first, label));
+    static const struct {
+        const char *text, *axes, *sentence; /* axes NULL: refused */
+    } c[] = {{SCAN("", "scan.nii"), "RAS", ""},
+             {SCAN("\"anatomical_axes\": \"RAS\", ", "scan.nii"), "RAS", ""},
+             {SCAN("\"anatomical_axes\": \"LPS\", ", "scan.nii"), NULL, "the axes of the scan are RAS, not LPS"},
+             {SCAN("\"anatomical_axes\": \"LAS\", ", "scan.nii"), NULL, "s.json: anatomical_axes: LAS is left-handed"},
+             {SCAN("\"anatomical_axes\": \"RSS\", ", "scan.nii"), NULL, "s.json: anatomical_axes: RSS is not three"},
+             {SCAN("\"anatomical_axes\": 3, ", "scan.nii"), NULL, "s.json: anatomical_axes: "},
+             {"{\"anatomical_axes\": \"LSA\", \"bodies\": [{\"mesh\": \"ball.palmesh\"}]}", "LSA", ""},
+             {"{\"bodies\": [{\"mesh\": \"ball.palmesh\"}]}", "", ""}};
+    for (size_t k = 0; k < sizeof c / sizeof *c; k++) {
+        pal_diagnostic diag = {""};
+        pal_loaded_scene *s = parse(c[k].text, &diag), *again = NULL;
+        CHECK((s != NULL) == (c[k].axes != NULL));
+        if (!strstr(diag.text, c[k].sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", diag.text, c[k].sentence);
+        if (!s) continue;
+        CHECK_TEXT(s->scene.anatomical_axes, c[k].axes);
+        char where[300], path[320];
+        snprintf(where, sizeof where, "%s/axes%zu", folder, k);
+        snprintf(path, sizeof path, "%s/scene.json", where);
+        REQUIRE(!pal_scene_save(s, where, &diag) && !pal_scene_load(path, &again, &diag));
+        CHECK_TEXT(again->scene.anatomical_axes, c[k].axes);
+        pal_scene_free(again);
+        pal_scene_free(s);
+    }
+}
+
 int main(void)
 {
     pal_diagnostic diag = {""};
@@ -208,6 +243,7 @@ int main(void)
     RUN(boxes_and_grids_hold_where_they_say);
     RUN(a_label_holds_in_its_voxels_however_the_scan_lies);
     RUN(a_saved_scene_has_the_same_material_everywhere);
+    RUN(a_scan_gives_its_anatomical_axes_and_no_others);
     RUN(every_bad_region_has_its_sentence);
     pal_prepared_free(&mesh);
     char command[400];

@@ -153,6 +153,12 @@ static void every_bad_body_has_its_sentence(void)
         {"{\"bodies\": [{\"surface\": \"x.stl\"}]}", "bodies[0].surface: "},
         {"{\"bodies\": [{\"surface\": \"scene.json\"}]}", "bodies[0].surface: "},
         {"{\"bodies\": [{\"mesh\": \"ball.palmesh\", \"x\": 1}]}", "bodies[0].x: unknown key"},
+        {"{\"bodies\": [{\"appearance\": \"livr\"}]}",
+         "bodies[0].appearance: \"livr\" is not one of liver|gall_bladder|stomach"},
+        {"{\"bodies\": [{\"appearance\": \"\"}]}", "bodies[0].appearance: is empty"},
+        {"{\"bodies\": [{\"colour\": \"red\"}]}", "bodies[0].colour: \"red\" is not a colour as #82352b"},
+        {"{\"bodies\": [{\"colour\": \"#12345g\"}]}", "bodies[0].colour: \"#12345g\" is not a colour"},
+        {"{\"bodies\": [{\"colour\": \"#1234567\"}]}", "bodies[0].colour: 8 bytes of text, more than 7"},
         {"{\"bodies\": [{\"material\": []}]}", "bodies[0].material: is not an object"},
         {"{\"bodies\": [{\"material\": {\"E\": 1}}]}", "bodies[0].material.E: unknown key; known are young_Pa"},
         {"{\"bodies\": [{\"material\": {\"young_Pa\": 0}}]}", "bodies[0].material.young_Pa: 0 is outside"},
@@ -335,6 +341,8 @@ static void a_saved_scene_loads_to_the_same_world_step_by_step(void)
     in->scene.tool[0].radius_m = 0.1 / 3;
     in->scene.tool[0].instrument = PAL_INSTRUMENT_SCISSORS;
     in->scene.tool[0].has_trocar = true, in->scene.tool[0].trocar_m[1] = 0.1 / 7;
+    snprintf(in->scene.body[0].appearance, PAL_APPEARANCE_BYTES, "liver");
+    snprintf(in->scene.body[0].colour, PAL_COLOUR_BYTES, "#82352b");
     pal_entry_put_number(&in->scene.body[0].model, "k_distance_J", 0.1 / 7, NULL);
     in->scene.body[0].n_support = 2;
     in->scene.body[0].support[1] = (pal_support_def){.low_m = {-1, -1, -1}, .high_m = {-0.04, 1, 1}};
@@ -352,6 +360,8 @@ static void a_saved_scene_loads_to_the_same_world_step_by_step(void)
     CHECK_INT(out->scene.tool[0].instrument, PAL_INSTRUMENT_SCISSORS);
     CHECK(out->scene.tool[0].has_trocar && !out->scene.tool[1].has_trocar);
     CHECK_NEAR(out->scene.tool[0].trocar_m[1], 0.1 / 7, 0);
+    CHECK_TEXT(out->scene.body[0].appearance, "liver");
+    CHECK_TEXT(out->scene.body[0].colour, "#82352b");
     CHECK_NEAR(out->scene.body[0].material.damping_1_s, 3, 0);
     /* a damping that is derived stays one */
     pal_scene_free(out);
@@ -661,6 +671,31 @@ static void a_shape_as_it_lies_is_pulled_down_only_when_asked(void)
     }
 }
 
+static void a_body_looks_as_asked_for_or_as_it_is_named(void)
+{
+    static const struct {
+        const char *shape, *asked, *found;
+    } shape[] = {{NULL, NULL, "liver"},
+                 {NULL, "spleen", "spleen"},
+                 {"stomach", NULL, "stomach"},
+                 {"sphere", NULL, ""},
+                 {"sphere", "fat", "fat"}};
+    for (size_t k = 0; k < sizeof shape / sizeof shape[0]; k++) {
+        pal_loaded_scene *made = NULL;
+        pal_diagnostic diag = {""};
+        pal_surface_scene options = {.label = -1,
+                                     .resolution = shape[k].shape ? 0 : 6,
+                                     .target_tri = 400,
+                                     .shape = shape[k].shape,
+                                     .adaptive = shape[k].shape != NULL,
+                                     .appearance = shape[k].asked};
+        pal_err err = pal_scene_procedural(&options, &made, NULL, &diag);
+        if (err) CHECK_FAIL("%s", diag.text);
+        if (!err) CHECK_TEXT(made->scene.body[0].appearance, shape[k].found);
+        pal_scene_free(made);
+    }
+}
+
 int main(void)
 {
     char command[128];
@@ -674,6 +709,7 @@ int main(void)
     RUN(every_bad_grid_of_springs_has_its_sentence);
     RUN(absent_keys_take_the_defaults);
     RUN(given_keys_arrive);
+    RUN(a_body_looks_as_asked_for_or_as_it_is_named);
     RUN(a_saved_scene_loads_to_the_same_world_step_by_step);
     RUN(constants_of_springs_come_back_bit_for_bit);
     RUN(two_bodies_of_like_names_get_two_files);

@@ -174,6 +174,7 @@ static void bare_cells_become_a_scene(void)
     CHECK_TEXT(loaded->scene.name, "my_bricks");
     CHECK_TEXT(loaded->scene.title, "My Bricks");
     CHECK_TEXT(loaded->scene.source, "My Bricks.palcells");
+    CHECK_TEXT(loaded->scene.body[0].appearance, "plastic");
     const pal_body_def *def = &loaded->scene.body[0];
     CHECK_TEXT(def->model.name, "subdivision_fem");
     CHECK_NEAR(def->model.value[0].number[0], 2, 0);

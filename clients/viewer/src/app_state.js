@@ -31,7 +31,7 @@ export class AppState {
     /** @type {{low: number, high: number} | null} of the colours; null: no values yet */
     range = null;
     wireframe = false;
-    figures = { fps: 0, latency_ms: 0, rtt_ms: 0, decode_ms: 0, bytes_s: 0, vertices: 0 };
+    figures = { fps: 0, latency_ms: 0, rtt_ms: 0, decode_ms: 0, bytes_s: 0, vertices: 0, effects: "" };
 
     get parts() {
         return this.hello?.parts ?? [];

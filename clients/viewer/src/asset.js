@@ -5,6 +5,7 @@ import { checkOf, VERTEX_MAX } from "./wire.js";
 
 const MAGIC = 0x314d4c50;
 const VERSION = 1;
+const VERSION_IMAGE = 2; // with image coordinates
 const HEAD_BYTES = 40;
 const BYTES_MAX = 2 ** 28;
 const TRIANGLE_MAX = 2 ** 24;
@@ -15,9 +16,10 @@ const ABS_MAX = 8191;
 /**
  * @typedef {{
  *   rest: Float32Array, triangles: Uint32Array, vertexOf: Uint32Array, neighbour: Uint32Array, weight: Int16Array,
- *   levels: Uint32Array
+ *   levels: Uint32Array, uv: Float32Array<ArrayBuffer> | null
  * }} Asset rest [n][3] m and triangles in vertex order; vertexOf [n] maps wire index to vertex; neighbour and weight
- *   [n][4] in wire order; levels: first wire index of each level
+ *   [n][4] in wire order; levels: first wire index of each level; uv: image
+ *   coordinates in vertex order from the lower left corner [n][2]
  */
 
 const need = checkOf("asset");
@@ -40,20 +42,29 @@ function readHead(bytes) {
         view.getUint32(4 * i, true),
     );
     need(magic === MAGIC, "MAGIC", "does not begin with PLM1");
-    need(version === VERSION, "KIND", `version ${version}, this page reads ${VERSION}`);
+    need(
+        version === VERSION || version === VERSION_IMAGE,
+        "KIND",
+        `version ${version}, this page reads ${VERSION} and ${VERSION_IMAGE}`,
+    );
     need(zero === 0 && zero2 === 0, "FLAGS", "reserved fields");
     need(
         n > 0 && n <= VERTEX_MAX && nTriangle <= TRIANGLE_MAX && nLevel > 0 && nLevel <= LEVEL_MAX && nLevel <= n,
         "COUNT",
         "counts",
     );
-    need(40 * n + 12 * nTriangle + 4 * nLevel === nRaw && nRaw <= BYTES_MAX, "COUNT", "counts do not fit the length");
+    const perVertex = version === VERSION_IMAGE ? 48 : 40;
+    need(
+        perVertex * n + 12 * nTriangle + 4 * nLevel === nRaw && nRaw <= BYTES_MAX,
+        "COUNT",
+        "counts do not fit the length",
+    );
     need(nLz4 <= bytes.length - HEAD_BYTES, "SHORT", "cut short");
     need(nLz4 >= bytes.length - HEAD_BYTES, "LONG", "bytes behind the end");
     need(Math.floor(nRaw / 255) <= nLz4, "COUNT", "states more than its bytes can hold");
     const block = bytes.subarray(HEAD_BYTES);
     need(fnv1a(block) === sum, "CHECKSUM", "checksum does not match");
-    return { n, nTriangle, nLevel, nRaw, block };
+    return { n, nTriangle, nLevel, nRaw, block, hasImage: version === VERSION_IMAGE };
 }
 
 /**
@@ -72,8 +83,9 @@ export const unfold = (v) => (v >>> 1) ^ -(v & 1);
 
 /** @param {Asset} asset @param {number} n */
 function check(asset, n) {
-    const { rest, triangles, vertexOf, neighbour, weight, levels } = asset;
+    const { rest, triangles, vertexOf, neighbour, weight, levels, uv } = asset;
     need(rest.every(Number.isFinite), "NAN", "a rest position is not finite");
+    need(uv === null || uv.every(Number.isFinite), "NAN", "an image coordinate is not finite");
     need(
         triangles.every((v) => v < n),
         "RANGE",
@@ -99,16 +111,21 @@ function check(asset, n) {
  * @returns {Asset}
  */
 export function decodeAsset(bytes) {
-    const { n, nTriangle, nLevel, nRaw, block } = readHead(bytes);
+    const { n, nTriangle, nLevel, nRaw, block, hasImage } = readHead(bytes);
     const raw = new Uint8Array(nRaw);
     lz4Decode(block, raw, 0, nRaw);
 
-    const bits = new Uint32Array(3 * n);
+    /** the next numbers of n rows of c @param {number} c */
+    const floats = (c) => {
+        const bits = new Uint32Array(c * n);
+        for (let k = 0; k < c; k++, at += 4 * n) planes(raw, at, n).forEach((v, i) => (bits[c * i + k] = v));
+        return new Float32Array(bits.buffer);
+    };
+    let at = 0;
+    const rest = floats(3);
     const vertexOf = planes(raw, 12 * n, n);
     const neighbour = new Uint32Array(4 * n);
     const weight = new Int16Array(4 * n);
-    let at = 0;
-    for (let c = 0; c < 3; c++, at += 4 * n) planes(raw, at, n).forEach((v, i) => (bits[3 * i + c] = v));
     for (let i = 0, before = 0; i < n; i++) before = vertexOf[i] = before + unfold(vertexOf[i]);
     at += 4 * n;
     for (let j = 0; j < 4; j++, at += 4 * n) {
@@ -120,15 +137,11 @@ export function decodeAsset(bytes) {
     const triangles = planes(raw, at, 3 * nTriangle);
     for (let e = 0; e < 3 * nTriangle; e++) triangles[e] = unfold(triangles[e]) + (e < 3 ? 0 : triangles[e - 3]);
     at += 12 * nTriangle;
+    const levels = planes(raw, at, nLevel);
+    at += 4 * nLevel;
+    const uv = hasImage ? floats(2) : null;
 
-    const asset = {
-        rest: new Float32Array(bits.buffer),
-        triangles,
-        vertexOf,
-        neighbour,
-        weight,
-        levels: planes(raw, at, nLevel),
-    };
+    const asset = { rest, triangles, vertexOf, neighbour, weight, levels, uv };
     check(asset, n);
     return asset;
 }

@@ -1,6 +1,7 @@
 // One shown part: the geometry of decoded frames, the triangles of a part that adapts, its edges. Only vertices of the
 // triangles shown have meaningful positions.
 import { FieldColours } from "./field_colours.js";
+import { vertexNormals } from "./normals.js";
 import { pickTriangle } from "./picking.js";
 import * as THREE from "./three.js";
 import { makeTissue } from "./tissue_material.js";
@@ -42,8 +43,9 @@ export class BodyMesh {
      * @param {THREE.Scene} scene
      * @param {Float32Array} rest [n][3] @param {Uint32Array} triangles [m][3]
      * @param {Uint32Array | null} visible the vertices in the triangles, null: all
+     * @param {import("./tissue_looks.js").Look} look
      */
-    constructor(scene, rest, triangles, visible) {
+    constructor(scene, rest, triangles, visible, look) {
         this.scene = scene;
         this.rest = rest;
         this.visible = visible;
@@ -59,9 +61,14 @@ export class BodyMesh {
         this.colours = new FieldColours(this.geometry, rest.length / 3);
         this.nCorner = 0;
         this.takeTriangles(triangles);
-        this.mesh = new THREE.Mesh(this.geometry, makeTissue(this.colours.uniforms));
+        this.mesh = new THREE.Mesh(this.geometry, makeTissue(this.colours.uniforms, look));
         this.colours.material = this.mesh.material;
         this.closed = isClosed(rest, triangles);
+        if (look.vessels.amount > 0) {
+            this.restNormal = new THREE.BufferAttribute(new Float32Array(rest.length), 3);
+            this.geometry.setAttribute("restNormal", this.restNormal);
+            this.updateRestNormals(triangles);
+        }
         if (this.closed) this.mesh.material.side = THREE.FrontSide;
         this.mesh.frustumCulled = false;
         this.mesh.visible = false;
@@ -70,6 +77,13 @@ export class BodyMesh {
         /** @type {THREE.Mesh<THREE.BufferGeometry, THREE.MeshBasicMaterial> | null} */
         this.lines = null;
         scene.add(this.mesh);
+    }
+
+    /** normals at rest, by which patterns are laid on @param {Uint32Array} triangles */
+    updateRestNormals(triangles) {
+        if (!this.restNormal) return;
+        vertexNormals(this.rest, triangles, /** @type {Float32Array} */ (this.restNormal.array), this.visible);
+        this.restNormal.needsUpdate = true;
     }
 
     nVisible() {
@@ -124,6 +138,7 @@ export class BodyMesh {
         this.colours.extend(triangles, this.visible);
         this.takeTriangles(triangles);
         this.visible = visible;
+        this.updateRestNormals(triangles);
     }
 
     /**

@@ -11,11 +11,14 @@ const part = /** @type {const} */ ({
     n_vertex: "u32",
     n_triangle: "u32",
     asset: "text",
+    "image?": "text",
     error_m: "f64",
     "fields?": "texts",
     "interior?": "text",
     "adaptive?": "bool",
     "sculptable?": "bool",
+    "appearance?": "text",
+    "colour?": "text",
 });
 
 const member = /** @type {const} */ ({
@@ -42,6 +45,7 @@ export const SERVER_MESSAGES = Object.freeze(
             box_min_m: "vector",
             box_max_m: "vector",
             up: "vector",
+            "anatomical_axes?": "text",
             parts: [part],
             tools: [
                 {

@@ -14,7 +14,9 @@ const ROLL_RAD = Math.PI / 12; // turn of the instrument for a key press
  *   state: import("./app_state.js").AppState, stage: import("./stage.js").Stage, layout: import("./layout.js").Layout,
  *   input: import("./tool_input.js").ToolInput, fields: import("./field_display.js").FieldDisplay,
  *   inside: import("./inside.js").Inside,
- *   accuracy: import("./accuracy_panel.js").AccuracyPanel, sculpt: import("./sculpt_panel.js").SculptPanel,
+ *   accuracy: import("./accuracy_panel.js").AccuracyPanel, plots: import("./plots.js").Plots,
+ *   sculpt: import("./sculpt_panel.js").SculptPanel,
+ *   viewMenu: import("./view_menu.js").ViewMenu,
  *   send: (message: import("./control_table.js").ClientMessage) => void, showFigures: () => void
  * }} Page the parts of the page that the controls act on
  */
@@ -31,6 +33,7 @@ export class Controls {
         buttonById("reset").onclick = () => this.command("reset");
         buttonById("mesh").onclick = () => this.toggleMesh();
         buttonById("accuracy-toggle").onclick = () => this.openAccuracy(!page.accuracy.opened);
+        buttonById("plots-toggle").onclick = () => this.openPlots(!page.plots.opened);
         buttonById("panel-toggle").onclick = () => this.togglePanel();
         buttonById("help-open").onclick = () => this.openHelp();
         this.addKeys();
@@ -38,7 +41,7 @@ export class Controls {
     }
 
     addKeys() {
-        const { accuracy, fields, input, layout, sculpt, stage } = this.page;
+        const { accuracy, fields, input, layout, plots, sculpt, stage, viewMenu } = this.page;
         const keyboard = new KeyboardTool(stage, input, () => {
             htmlById("hint").classList.add("gone");
             layout.notice(text("hint.keys"), KEYS_MS);
@@ -49,6 +52,7 @@ export class Controls {
                 2: () => this.setMode("press"),
                 3: () => this.setMode("sculpt"),
                 4: () => this.openAccuracy(!accuracy.opened),
+                5: () => this.openPlots(!plots.opened),
                 " ": () => this.togglePause(),
                 r: () => this.command("reset"),
                 p: () => this.togglePanel(),
@@ -57,6 +61,8 @@ export class Controls {
                 q: () => input.roll(-ROLL_RAD),
                 w: () => input.roll(ROLL_RAD),
                 i: () => this.page.inside.toggle(),
+                e: () => viewMenu.toggleEndoscope(),
+                v: () => viewMenu.save(),
                 "?": () => this.openHelp(),
                 f1: () => this.openHelp(),
                 escape: () => this.closePanels(),
@@ -66,7 +72,8 @@ export class Controls {
         window.addEventListener("keydown", (e) => {
             // an open dialog has the keyboard; it closes with Escape by itself
             if (byId("help", HTMLDialogElement).open) return;
-            const action = keyboard.key(e) || sculpt.key(e) ? () => {} : actionOf(e);
+            const handled = keyboard.key(e) || sculpt.key(e) || viewMenu.goByKey(e);
+            const action = handled ? () => {} : actionOf(e);
             if (!action) return;
             e.preventDefault();
             action();
@@ -77,6 +84,7 @@ export class Controls {
         if (!htmlById("panel").hidden) this.togglePanel();
         if (!htmlById("inside").hidden) this.page.inside.toggle();
         this.openAccuracy(false);
+        this.openPlots(false);
     }
 
     openHelp() {
@@ -101,8 +109,8 @@ export class Controls {
     setMode(mode) {
         const { input, sculpt } = this.page;
         if (mode === "sculpt" && !sculpt.offered) return;
+        if (mode === "sculpt") this.clearLeft();
         input.mode = mode;
-        if (mode === "sculpt") this.openAccuracy(false);
         input.release();
         htmlById("sculpt").hidden = mode !== "sculpt";
         this.makeRoom(mode === "sculpt");
@@ -154,19 +162,16 @@ export class Controls {
         const panel = htmlById("panel");
         panel.hidden = !panel.hidden;
         buttonById("panel-toggle").setAttribute("aria-expanded", String(!panel.hidden));
-        if (!panel.hidden && !this.page.layout.hasRoom()) {
-            this.openAccuracy(false);
-            if (this.page.input.mode === "sculpt") this.setMode("pull");
-        }
+        if (!panel.hidden && !this.page.layout.hasRoom()) this.clearLeft();
         this.place();
         this.page.showFigures();
     }
 
     /** @param {boolean} opened */
     openAccuracy(opened) {
-        const { accuracy, input, state } = this.page;
+        const { accuracy, state } = this.page;
         if (opened && !state.hello?.estimates) return;
-        if (opened && input.mode === "sculpt") this.setMode("pull"); // both panels stand on the left
+        if (opened) this.clearLeft();
         htmlById("accuracy-panel").hidden = !opened;
         buttonById("accuracy-toggle").setAttribute("aria-expanded", String(opened));
         accuracy.open(opened);
@@ -177,5 +182,20 @@ export class Controls {
     makeRoom(opened) {
         if (opened && !htmlById("panel").hidden && !this.page.layout.hasRoom()) this.togglePanel();
         this.place();
+    }
+
+    /** @param {boolean} opened */
+    openPlots(opened) {
+        if (opened) this.clearLeft();
+        buttonById("plots-toggle").setAttribute("aria-expanded", String(opened));
+        // its height is known when the charts exist
+        this.page.plots.open(opened).then(() => this.makeRoom(opened));
+    }
+
+    /** accuracy, plots and sculpting stand in the same place: one at a time */
+    clearLeft() {
+        if (this.page.accuracy.opened) this.openAccuracy(false);
+        if (this.page.plots.opened) this.openPlots(false);
+        if (this.page.input.mode === "sculpt") this.setMode("pull");
     }
 }

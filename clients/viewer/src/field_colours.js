@@ -1,6 +1,6 @@
 // The values of a field on one body, blended from one set to the next and shown as colours by the tissue's shader.
 import * as THREE from "./three.js";
-import { makeUniforms, MATT, WET } from "./tissue_material.js";
+import { makeUniforms, MATT } from "./tissue_material.js";
 
 const BLEND_MS = 100; // the interval of FIELD messages
 
@@ -47,7 +47,7 @@ export class FieldColours {
     /** @param {number} share of the colours: 0 natural colour, 1 the field alone */
     enable(share) {
         this.uniforms.mix.value = share;
-        if (this.material) Object.assign(this.material, share > 0 ? MATT : WET);
+        if (this.material) Object.assign(this.material, share > 0 ? MATT : this.material.userData.wet);
     }
 
     /** values of the first and the last colour @param {{low: number, high: number}} range @param {readonly string[]} map */

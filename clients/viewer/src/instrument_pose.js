@@ -1,10 +1,10 @@
-// Orientation of an instrument. Quaternions are w x y z; axes of the tool as in protocol/README.md: x from hand to tip,
+// Orientation of an instrument. Quaternions are w x y z; axes of the tool as in protocol/README.md: x from tip to hand,
 // the jaws turn about z. Pure.
 import { cross, dot, subtract, unit } from "./solid_shapes.js";
 
 /**
- * The hand that holds an instrument: its shaft passes `port` (m); `from` is its orientation when the shaft pointed
- * along `axis`; roll: turn about the shaft since then, rad.
+ * The hand that holds an instrument: its shaft passes `port` (m); `from` is its orientation when the hand was
+ * in the direction `axis` of the tip; roll: turn about the shaft since then, rad.
  * @typedef {{port: number[], axis: number[], from: number[], roll: number}} Hand
  */
 
@@ -24,6 +24,9 @@ export function rotate([w, ...u], v) {
     return v.map((c, k) => c + w * t[k] + cross(u, t)[k]);
 }
 
+/** rotation about a unit vector @param {number[]} axis @param {number} angle rad */
+const turn = (axis, angle) => [Math.cos(angle / 2), ...axis.map((v) => v * Math.sin(angle / 2))];
+
 /** shortest rotation from one unit vector to another @param {number[]} a @param {number[]} b */
 export function between(a, b) {
     const w = 1 + dot(a, b);
@@ -39,7 +42,8 @@ export function facing(axis, facing) {
     const hint = Math.abs(dot(axis, facing)) < PARALLEL ? facing : [axis[2], axis[0], axis[1]];
     const z = unit(hint.map((v, k) => v - dot(hint, axis) * axis[k]));
     const first = between([1, 0, 0], axis);
-    return multiply(between(rotate(first, [0, 0, 1]), z), first);
+    const begun = rotate(first, [0, 0, 1]);
+    return multiply(turn(axis, Math.atan2(dot(cross(begun, z), axis), dot(begun, z))), first);
 }
 
 /**
@@ -47,15 +51,15 @@ export function facing(axis, facing) {
  * @param {number[]} port m @param {number[]} tip m @param {number[]} towards unit, to the eye @returns {Hand}
  */
 export function handAt(port, tip, towards) {
-    const axis = unit(subtract(tip, port));
+    const axis = unit(subtract(port, tip));
     return { port, axis, from: facing(axis, towards), roll: 0 };
 }
 
 /** orientation with the tip at a point: the shaft turns about the port on the shortest way @param {Hand} hand @param {number[]} tip m */
 export function aim({ port, axis, from, roll }, tip) {
-    const now = unit(subtract(tip, port));
+    const now = unit(subtract(port, tip));
     const turned = multiply(between(axis, now), from);
-    return multiply([Math.cos(roll / 2), ...now.map((v) => v * Math.sin(roll / 2))], turned);
+    return multiply(turn(now, roll), turned);
 }
 
 /** has anybody said how the tool is turned? @param {number[]} q */

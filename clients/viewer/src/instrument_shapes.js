@@ -1,6 +1,5 @@
 // The instruments as solids. The unit of length is the radius of the tool, whose sphere of contact lies around the
-// origin. Axes as in protocol/README.md: x along the shaft from hand to tip, the jaws open in the plane of x and y,
-// the origin is the tip. Pure.
+// origin. Axes: x along the shaft from hand to tip, the jaws open in the plane of x and y, the origin is the tip. Pure.
 import { ellipse, loft, mirrored, moved, plate, swept, turned } from "./solid_shapes.js";
 
 /**

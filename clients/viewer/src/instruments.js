@@ -12,6 +12,8 @@ import * as THREE from "./three.js";
  */
 
 const Z_AXIS = new THREE.Vector3(0, 0, 1); // of three's torus
+// about z: the x axis of a tool points to the hand, that of its solids to the tip
+const HALF_TURN = new THREE.Quaternion(0, 0, 1, 0);
 const SHAFT_LENGTH = 44; // radii of the tool: 330 mm for 7.5 mm
 const BEYOND_PORT = 8; // radii of the tool by which a shaft is at least longer than the way to its port
 const RING_LENGTH = 0.7; // of the ring in the colour of the member, radii of the tool
@@ -112,7 +114,7 @@ export class Instrument {
         const { group, port, shape, trocar } = this;
         const [w, x, y, z] = orientation;
         group.position.fromArray(tool.position);
-        group.quaternion.set(x, y, z, w);
+        group.quaternion.set(x, y, z, w).multiply(HALF_TURN);
         group.scale.setScalar(radius);
         const toPort = port ? port.distanceTo(group.position) / radius + BEYOND_PORT : 0;
         this.shaft.scale.set(Math.max(SHAFT_LENGTH, toPort), SHAFT_RADIUS, SHAFT_RADIUS);

@@ -53,7 +53,7 @@ export class KeyboardTool {
         const position = new THREE.Vector3()
             .fromArray(move)
             .multiplyScalar(STEP * stage.size)
-            .applyQuaternion(stage.camera.quaternion)
+            .applyQuaternion(stage.view.camera.quaternion)
             .add(new THREE.Vector3().fromArray(held.position));
         input.hold({ ...held, position: position.toArray() });
         return true;
@@ -62,9 +62,10 @@ export class KeyboardTool {
     begin() {
         const { input, stage } = this;
         if (!input.enabled || input.drag || input.mode === "sculpt") return false;
-        const { left, top, width, height } = stage.canvas.getBoundingClientRect();
-        for (const { x, y } of pixelsFromMiddle(width, height)) {
-            const hit = input.pick(stage.ray(left + x, top + y));
+        const { left, top } = stage.canvas.getBoundingClientRect();
+        const box = stage.pane.box(stage.canvas);
+        for (const { x, y } of pixelsFromMiddle(box.width, box.height)) {
+            const hit = input.hit({ clientX: left + box.x + x, clientY: top + box.y + y });
             if (!hit) continue;
             // a press begins outside
             if (input.mode === "press") hit.point.addScaledVector(hit.normal, input.radius);

@@ -3,10 +3,10 @@ import { htmlById } from "./dom.js";
 import { text as textOf } from "./text.js";
 
 const WIDTH_MIN = 260; // pixels between panels that the organ needs
-const NARROW = 640; // pixels: on a narrower page the panels lie below the organ, as in style.css
+export const NARROW = 640; // pixels: on a narrower page the panels lie below the organ, as in style.css
 const MARGIN = 18; // pixels beside a panel
 /** panels of each side */
-const LEFT = ["accuracy-panel", "sculpt"];
+const LEFT = ["accuracy-panel", "plots", "sculpt"];
 const RIGHT = ["panel"];
 
 export class Layout {

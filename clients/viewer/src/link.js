@@ -6,6 +6,7 @@ import { readControl } from "./control_reader.js";
 import { decodeField, readFieldHead } from "./field_decoder.js";
 import { InteriorLink } from "./interior_link.js";
 import { FrameDecoder, readFrameHead } from "./frame_decoder.js";
+import { findCopies, joinNormals, joinPositions } from "./image_seams.js";
 import { vertexNormals } from "./normals.js";
 import { text as textOf } from "./text.js";
 import { applyTopologyDelta, readTopologyDeltaHead, shownOf } from "./topology_delta.js";
@@ -21,6 +22,7 @@ const SILENT_MS = 1100; // the server sends its status three times a second: lon
 const LISTEN_MS = 200; // between two looks at that: it is told within 1.5 s
 const FIGURES_MS = 500;
 const LATENCY_MAX_MS = 10000; // a larger value comes from the clock of another connection
+const NONE = new Uint32Array(); // no vertex is doubled
 const SPARE_MAX = 4; // pairs of arrays that wait for reuse
 const CLOSE_FULL = 4003; // for now: tried again
 const CLOSE_NO_SESSION = 4004; // or it has ended
@@ -50,18 +52,18 @@ const FINAL = new Map([
  * Messages from the worker to the page.
  * @typedef {{type: "state", state: ConnectionState, text: string}
  *   | {type: "control", message: ServerMessage}
- *   | ({type: "part", part: number, epoch: number, rest: Float32Array} & Shown)
+ *   | ({type: "part", part: number, epoch: number, rest: Float32Array, uv: Float32Array<ArrayBuffer> | null} & Shown)
  *   | ({type: "frame", part: number, shown: Shown | null} & FrameArrays)
  *   | {type: "field", part: number, name: string, low: number, high: number, level: Uint8Array}
  *   | import("./interior_link.js").InteriorMesh | import("./interior_link.js").InteriorValues
- *   | {type: "tools", tools: import("./wire.js").Tool[]}
+ *   | {type: "tools", time: number, tools: import("./wire.js").Tool[]}
  *   | {type: "silence", seconds: number}
  *   | {type: "figures", figures: LinkFigures}} PageMessage silence: of the server, whole seconds; 0: it answers again
  */
 /**
  * Messages from the page to the worker.
- * @typedef {{url: string, name: string, role: import("./control_table.js").Role, ticket: string}} Wishes of a join; a
- *   ticket of "": none
+ * @typedef {{url: string, name: string, role: import("./control_table.js").Role, ticket: string, toolOnly?: boolean}} Wishes
+ *   of a join; a ticket of "": none; toolOnly: nothing of the scene but its tools is taken
  * @typedef {({type: "connect"} & Wishes)
  *   | ({type: "pose"} & ToolPose)
  *   | {type: "control", message: ClientMessage}
@@ -76,7 +78,7 @@ const FINAL = new Map([
  *   later: (call: () => void, ms: number) => void,
  * }} Environment
  * @typedef {{decoder: FrameDecoder, table: Uint32Array, shown: Shown, changed: boolean, epoch: number, n: number,
- *   spare: FrameArrays[]}} Part table: of triangles, up to date; shown: of the table at the last frame; changed: the
+ *   spare: FrameArrays[], copies: Uint32Array}} Part copies: of image_seams.js; table: of triangles, up to date; shown: of the table at the last frame; changed: the
  *   table has changed since
  */
 
@@ -171,7 +173,7 @@ export class Link {
                 name: this.options.name,
                 role: this.options.role,
                 tool: this.options.role === "viewer" ? null : -1,
-                topology_deltas: true,
+                topology_deltas: !this.options.toolOnly,
             });
         };
         socket.onmessage = (event) => {
@@ -276,6 +278,7 @@ export class Link {
         const bytes = new Uint8Array(data);
         this.bytes += bytes.length;
         const head = readHead(bytes);
+        if (this.options.toolOnly && head.kind !== KIND.TOOLS) return;
         if (head.kind === KIND.FRAME) this.frame(head.index, bytes);
         else if (head.kind === KIND.TOOLS) this.tools(bytes);
         else if (head.kind === KIND.FIELD) this.field(head.index, bytes);
@@ -318,6 +321,7 @@ export class Link {
 
     /** @param {number} index @param {{epoch: number, asset: string, interior?: string}} info */
     async loadPart(index, info) {
+        if (this.options.toolOnly) return;
         this.interiors.offer(index, info, this.options.url.replace(/^ws/, "http"));
         if (this.requested.get(index) === info.epoch) return;
         this.requested.set(index, info.epoch);
@@ -339,8 +343,10 @@ export class Link {
                 epoch: info.epoch,
                 n,
                 spare: [],
+                copies: asset.uv ? findCopies(asset.rest) : NONE,
             });
-            this.env.post({ type: "part", part: index, epoch: info.epoch, rest: asset.rest.slice(), ...shown });
+            const { rest, uv } = asset;
+            this.env.post({ type: "part", part: index, epoch: info.epoch, rest: rest.slice(), uv, ...shown });
             this.decodeEarly(index);
         } catch (error) {
             if (generation === this.generation && this.requested.get(index) === info.epoch)
@@ -414,11 +420,13 @@ export class Link {
             normals: new Float32Array(3 * part.n),
         };
         part.decoder.decode(bytes, positions);
+        joinPositions(part.copies, positions);
         const ms = this.env.now() - begin;
         const shown = part.changed ? shownOf(part.table, part.n) : null;
         if (shown) part.shown = shown;
         part.changed = false;
         vertexNormals(positions, part.shown.triangles, normals, part.shown.visible);
+        joinNormals(part.copies, normals);
         this.decodeUs += Math.round(1000 * ms);
         this.decodeSum += ms;
         this.nDecoded++;
@@ -445,7 +453,7 @@ export class Link {
             if (latency >= 0 && latency < LATENCY_MAX_MS)
                 this.latency = this.latency ? 0.9 * this.latency + 0.1 * latency : latency;
         }
-        this.env.post({ type: "tools", tools: message.tools });
+        this.env.post({ type: "tools", time: message.simTimeUs / 1e6, tools: message.tools });
         if (now - this.figuresAt > FIGURES_MS) {
             const figures = {
                 latency_ms: this.latency,

@@ -4,19 +4,24 @@ import { AccuracyPanel } from "./accuracy_panel.js";
 import { AppState } from "./app_state.js";
 import { BodySet } from "./body_set.js";
 import { ROLES } from "./control_table.js";
+import { Capture } from "./capture.js";
 import { Controls } from "./controls.js";
 import { byId, htmlById, inputById } from "./dom.js";
+import { download } from "./download.js";
 import { WRITERS } from "./exporters.js";
 import { FieldDisplay } from "./field_display.js";
+import { ForceCue } from "./force_cue.js";
 import { forceText } from "./force_text.js";
 import { Inside } from "./inside.js";
 import { Layout } from "./layout.js";
 import { MembersPanel } from "./members_panel.js";
 import { Messages } from "./messages.js";
+import { OrientationCube } from "./orientation.js";
 import { OtherTools } from "./other_tools.js";
 import { pressDepth, withOwnTool } from "./own_tool.js";
 import { PlanPanel } from "./plan_panel.js";
 import { PlaybackBar } from "./playback_bar.js";
+import { Plots } from "./plots.js";
 import { PoseSender } from "./pose_sender.js";
 import { showScale } from "./scale_bar.js";
 import { SculptPanel } from "./sculpt_panel.js";
@@ -26,6 +31,8 @@ import { language, text } from "./text.js";
 import { takeTicket } from "./ticket.js";
 import { ToolInput } from "./tool_input.js";
 import { ToolMarks } from "./tool_marks.js";
+import { ViewMenu } from "./view_menu.js";
+import { ViewModes } from "./view_modes.js";
 
 const FORCE_MIN_N = 0.005; // a smaller force is displayed as 0.00
 const SLOW_NOTICE_MS = 12000;
@@ -48,6 +55,7 @@ const bodies = new BodySet(state, stage, (part, { positions, normals }) =>
     post({ type: "reuse", part, positions, normals }, [positions.buffer, normals.buffer]),
 );
 const poses = new PoseSender(state, post, () => stage.size);
+const ownPoses = [poses]; // of both hands in a headset
 const fields = new FieldDisplay(state, stage, send, layout);
 const inside = new Inside(state, stage, fields);
 const marks = new ToolMarks(stage, htmlById("labels"));
@@ -55,7 +63,11 @@ const panel = new PlanPanel(document, sendCommand);
 const members = new MembersPanel(document, sendCommand, () => performance.now());
 const playback = new PlaybackBar(document, sendCommand);
 const others = new OtherTools();
+const orientation = new OrientationCube(document.body);
 const accuracy = new AccuracyPanel(document, sendCommand);
+const plots = new Plots(state);
+const cue = new ForceCue(stage, state);
+const capture = new Capture(stage, state);
 const sculpt = new SculptPanel(document, sendCommand, save);
 const input = new ToolInput(
     stage,
@@ -70,9 +82,22 @@ const input = new ToolInput(
 );
 input.onClick = (/** @type {number[]} */ position) => sculpt.click(position);
 input.onFirstDrag = () => htmlById("hint").classList.add("gone");
+const views = new ViewModes(
+    stage,
+    (ray) => bodies.pick(ray),
+    () => {},
+);
+const viewMenu = new ViewMenu(state, stage, views);
+viewMenu.offerHeadset(() => {
+    input.release();
+    const { name, ...rest } = joinOptions();
+    const second = { ...rest, name: text("views.second_hand", { name }) };
+    return { state, stage, poses: ownPoses, second, picture };
+});
 const showFigures = () => messages.showFigures();
-const controls = new Controls({ state, stage, layout, input, fields, accuracy, sculpt, inside, send, showFigures });
-const panels = { panel, members, accuracy, sculpt, playback, others, controls };
+const tools = { accuracy, plots, sculpt, inside, viewMenu };
+const controls = new Controls({ state, stage, layout, input, fields, ...tools, send, showFigures });
+const panels = { panel, members, accuracy, plots, sculpt, playback, others, controls };
 const messages = new Messages({ state, stage, layout, bodies, fields, inside, input, marks, send, ...panels });
 worker.onmessage = (/** @type {MessageEvent<import("./link.js").PageMessage>} */ { data }) => messages.take(data);
 
@@ -90,10 +115,7 @@ function makeStage() {
 /** downloads the shown surfaces as a file @param {string} format key of WRITERS */
 function save(format) {
     const surfaces = [...state.bodies.values()].map((body) => body.surface());
-    const name = (state.hello?.session ?? "palpate").replace(/[^\w-]+/g, "_");
-    const href = URL.createObjectURL(new Blob([WRITERS[format](surfaces)]));
-    Object.assign(document.createElement("a"), { href, download: `${name}.${format}` }).click();
-    setTimeout(() => URL.revokeObjectURL(href), 10000);
+    download(new Blob([WRITERS[format](surfaces)]), state.hello?.session ?? "", `.${format}`);
 }
 
 function showForce() {
@@ -108,11 +130,17 @@ let toldSlow = false; // that this browser draws slowly: once
 let countedAt = performance.now();
 function draw() {
     requestAnimationFrame(draw);
+    if (stage.immersive) return; // the headset asks for its pictures
     input.tick();
     poses.send(false);
+    picture();
+}
+
+function picture() {
     const now = performance.now();
     if (stage.ready()) {
         marks.depth = pressDepth(input.drag, state.ownToolState());
+        cue.update(now);
         if (bodies.applyFrames()) {
             stage.dirty = true;
             nDrawn++;
@@ -124,7 +152,10 @@ function draw() {
             const own = state.plays ? -1 : state.ownTool;
             marks.drawn = state.tools;
             marks.update(
-                withOwnTool(others.draw(now), own, poses.last),
+                ownPoses.reduce(
+                    (tools, { state: hand, last }) => withOwnTool(tools, state.plays ? -1 : hand.ownTool, last),
+                    others.draw(now),
+                ),
                 (id, tool) =>
                     state.members.get(id)?.name ?? (state.plays ? (state.hello?.tools[tool]?.name ?? "") : ""),
                 own,
@@ -136,6 +167,8 @@ function draw() {
             marks.placeLabels();
             showForce();
             showScale(htmlById("scale"), stage.pixelsPerMetre());
+            orientation.show(state.hello?.anatomical_axes ?? "", stage.camera.matrixWorldInverse.elements);
+            capture.drawn();
         }
     }
     if (now - countedAt > 1000) {
@@ -152,15 +185,18 @@ function draw() {
     }
 }
 
-function connect() {
+/** of the join of this page @returns {import("./link.js").Wishes} */
+function joinOptions() {
     const query = new URLSearchParams(location.search);
     const session = query.get("session");
     const scheme = location.protocol === "https:" ? "wss" : "ws";
     const url = `${scheme}://${location.host}/ws${session ? "?session=" + encodeURIComponent(session) : ""}`;
     // with a ticket: whatever it allows
     const role = ROLES.find((known) => known === query.get("role")) ?? (ticket ? "instructor" : "trainee");
-    post({ type: "connect", url, name: inputById("name").value.trim() || text("people.guest"), role, ticket });
+    return { url, name: inputById("name").value.trim() || text("people.guest"), role, ticket };
 }
+
+const connect = () => post({ type: "connect", ...joinOptions() });
 
 htmlById("lobby-link").hidden = !new URLSearchParams(location.search).has("session");
 inputById("name").value =
@@ -170,6 +206,7 @@ inputById("name").onchange = () => {
     connect();
 };
 // read-only access for tests and for the console
-Object.defineProperty(window, "palpate", { value: { state, stage, input, marks, accuracy, inside } });
+const shown = { state, stage, input, marks, accuracy, plots, capture, cue, views, inside };
+Object.defineProperty(window, "palpate", { value: shown });
 connect();
 draw();

@@ -2,6 +2,7 @@
 import { UNSEEN } from "./body_set.js";
 import { buttonById, htmlById } from "./dom.js";
 import { componentsOf, idleText } from "./plan_list.js";
+import { effectsText } from "./picture_effects.js";
 import { speedText } from "./plan_panel.js";
 import { playbackText } from "./playback_bar.js";
 import { text as textOf } from "./text.js";
@@ -16,7 +17,7 @@ import { sameTools } from "./tool_marks.js";
  *   inside: import("./inside.js").Inside,
  *   input: import("./tool_input.js").ToolInput, marks: import("./tool_marks.js").ToolMarks,
  *   panel: import("./plan_panel.js").PlanPanel, members: import("./members_panel.js").MembersPanel,
- *   accuracy: import("./accuracy_panel.js").AccuracyPanel,
+ *   accuracy: import("./accuracy_panel.js").AccuracyPanel, plots: import("./plots.js").Plots,
  *   sculpt: import("./sculpt_panel.js").SculptPanel, playback: import("./playback_bar.js").PlaybackBar,
  *   others: import("./other_tools.js").OtherTools, controls: import("./controls.js").Controls,
  *   send: (message: import("./control_table.js").ClientMessage) => void
@@ -76,6 +77,7 @@ export class Messages {
                 if (!sameTools(marks.drawn, data.tools, UNSEEN * stage.size)) stage.dirty = true;
                 state.tools = data.tools;
                 this.page.others.take(data.tools, performance.now());
+                this.page.plots.take(data.time, data.tools);
                 break;
             case "silence":
                 layout.silence(data.seconds);
@@ -285,9 +287,10 @@ export class Messages {
     }
 
     showFigures() {
-        const { accuracy, panel, state } = this.page;
+        const { accuracy, panel, stage, state } = this.page;
         if (htmlById("panel").hidden || !state.status) return;
         this.page.members.showOrders();
+        state.figures.effects = effectsText(stage.effects);
         panel.showStatus(state.status, state.figures, state.parts);
         htmlById("idle").textContent = idleText({
             field: state.field !== "none",

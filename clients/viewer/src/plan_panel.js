@@ -156,6 +156,7 @@ export class PlanPanel {
         this.figure("details.substeps", String(status.substeps), true);
         this.figure("details.round_trip", figures.rtt_ms > 0 ? ms(figures.rtt_ms, 1) : "–", true);
         this.figure("details.decoding", ms(figures.decode_ms, 2), true);
+        this.figure("details.picture_effects", figures.effects, true);
         this.figure("details.received", rateText(figures.bytes_s), true);
         this.figure("details.vertices", figures.vertices.toLocaleString(language), true);
         this.showActivity(activeText(status.active ?? [], parts));

@@ -94,7 +94,7 @@ export class Section {
     chosen() {
         const { hello } = this.state;
         if (!hello) return [];
-        this.stage.placeCamera();
+        this.stage.placeCameras();
         const view = this.stage.camera.position.clone().sub(this.stage.target).normalize().toArray();
         const box = [hello.box_min_m, hello.box_max_m];
         return this.inside.planes.flatMap((plane) => planeOf(plane, box, view) ?? []);

@@ -1,10 +1,13 @@
-// The stage: renderer, light, camera and its orbit. Lengths are metres of the scene frame; `up` is the scene's.
+// The stage: renderer, light, and the panes of its canvas, one of which takes the input. Lengths are metres of the scene
+// frame; `up` is the scene's.
+import { makeBackdrop } from "./backdrop.js";
+import { OrbitView } from "./orbit_view.js";
 import { Pace } from "./pace.js";
+import { makeEffects } from "./picture_effects.js";
 import * as THREE from "./three.js";
+import { ViewPane } from "./view_pane.js";
 
 const RATIO_MIN = 0.4; // drawn pixels per page pixel, where drawing is slow
-const HOME_SHARE = 0.88; // of the picture's height: initial size of the scene's diagonal
-const ZOOM_MIN = 0.45; // beside panels
 const POLL_MS = 2; // between checks whether a picture is finished
 
 /** is there no graphics card? Some browsers report it, others only name the renderer */
@@ -37,13 +40,19 @@ function makeStudio(renderer) {
     };
     const room = new THREE.Mesh(
         new THREE.SphereGeometry(10, 24, 16),
-        new THREE.MeshBasicMaterial({ color: 0x20272e, side: THREE.BackSide }),
+        new THREE.MeshBasicMaterial({ color: 0x2a2725, side: THREE.BackSide }),
     );
     studio.add(room);
-    panel(9, "#fff4e6", [0, 2, 7], [6, 4, 0.2]); // above
-    panel(5, "#dcebff", [-7, 0, 2], [0.2, 4, 5]); // cool side
-    panel(3, "#ffe2c4", [7, -2, 1], [0.2, 3, 3]); // warm side
-    panel(0.6, "#8fa3b5", [0, 0, -7], [9, 9, 0.2]); // light from below, weak
+    // lamps above, small and bright as in an operating room: their reflections in wet tissue are spots, not patches
+    for (const [x, y] of [
+        [-2.4, 1],
+        [0, -2.2],
+        [2.4, 1],
+    ])
+        panel(26, "#fff6ea", [x, y, 7], [1.3, 1.3, 0.2]);
+    panel(0.9, "#fff4ea", [-7, 0, 2], [0.2, 7, 7]);
+    panel(0.7, "#fff2e6", [7, -2, 1], [0.2, 6, 6]);
+    panel(0.35, "#c9b7ab", [0, 0, -7], [9, 9, 0.2]); // light from below, weak
     const generator = new THREE.PMREMGenerator(renderer);
     const texture = generator.fromScene(studio, 0.035).texture;
     generator.dispose();
@@ -67,8 +76,8 @@ export class Stage {
             stencil: true, // caps of sections
             powerPreference: "high-performance",
         });
-        this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
-        this.renderer.toneMappingExposure = 1.0;
+        this.renderer.toneMapping = THREE.NeutralToneMapping;
+        this.renderer.toneMappingExposure = 1.05;
         this.scene = new THREE.Scene();
         const light = window.matchMedia("(prefers-color-scheme: light)");
         this.scene.background = makeBackdrop(light.matches);
@@ -76,23 +85,27 @@ export class Stage {
             this.scene.background = makeBackdrop(light.matches);
             this.dirty = true;
         });
-        this.camera = new THREE.PerspectiveCamera(32, 1, 0.001, 100);
         this.up = new THREE.Vector3(0, 0, 1);
-        this.target = new THREE.Vector3();
-        this.distance = 1;
-        this.azimuth = -0.6; // around up, rad
-        this.elevation = 0.42;
+        this.centre = new THREE.Vector3();
         this.size = 0.3; // diagonal of the scene, m
-        this.key = new THREE.DirectionalLight(0xfff2e2, 1.9);
-        this.rim = new THREE.DirectionalLight(0xbfd8ff, 1.1);
-        this.fill = new THREE.DirectionalLight(0xffe9dc, 0.85); // from the camera and below: no visible side is black
-        this.scene.add(this.key, this.rim, this.fill, new THREE.HemisphereLight(0xdfe9f2, 0x4a332b, 1.15));
+        this.free = new OrbitView(this);
+        /** @type {import("./view_pane.js").View[]} all views that exist, shown or not */
+        this.views = [this.free];
+        this.panes = [new ViewPane(this.free)];
+        this.pane = this.panes[0]; // the one under the pointer: it takes the input
+        this.key = new THREE.DirectionalLight(0xfff5ea, 2.6);
+        this.rim = new THREE.DirectionalLight(0xfff1e6, 1.0);
+        this.fill = new THREE.DirectionalLight(0xfff0e8, 0.6); // from the camera and below: no visible side is black
+        this.scene.add(this.key, this.rim, this.fill, new THREE.HemisphereLight(0xe9eaec, 0x3f3430, 0.85));
         this.scene.environment = makeStudio(this.renderer);
-        this.scene.environmentIntensity = 0.8;
+        this.scene.environmentIntensity = 0.75;
+        /** @type {{draw: () => void} | null} what draws for a headset, at its pace */
+        this.immersive = null;
         this.left = this.right = this.bottom = 0; // margins that panels cover, pixels
         this.dirty = true;
         const ratio = Math.min(window.devicePixelRatio || 1, 2);
         this.pace = new Pace(RATIO_MIN / ratio, software ? 0.6 / ratio : 1);
+        this.effects = makeEffects(this, software, new URLSearchParams(location.search).get("effects"));
         this.sizeDue = true; // the canvas has not the size of its element yet
         new ResizeObserver(() => this.resize()).observe(canvas);
         // moving to a screen with another pixel ratio keeps the size
@@ -106,28 +119,26 @@ export class Stage {
         this.resize();
     }
 
+    /** of the pane under the pointer */
+    get view() {
+        return this.pane.view;
+    }
+
+    get camera() {
+        return this.pane.camera;
+    }
+
+    get target() {
+        return this.view.target;
+    }
+
     /** looks at a box, of the scene's rest shape @param {number[][]} box @param {number[]} up */
     frameBox(box, up) {
         const [low, high] = box;
         this.up.fromArray(up).normalize();
-        this.target.set((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2);
+        this.centre.set((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2);
         this.size = Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
-        this.home();
-    }
-
-    /** distance of the initial view, which a narrow page increases */
-    homeDistance() {
-        return ((0.5 / HOME_SHARE) * this.size) / Math.tan((this.camera.fov * Math.PI) / 360) / this.narrow();
-    }
-
-    narrow() {
-        return Math.max(0.5, Math.min(1, this.camera.aspect));
-    }
-
-    home() {
-        this.distance = this.homeDistance();
-        this.azimuth = -0.6;
-        this.elevation = 0.42;
+        for (const view of this.views) view.home();
         this.dirty = true;
     }
 
@@ -136,13 +147,8 @@ export class Stage {
     }
 
     resize() {
-        const width = this.canvas.clientWidth || 1;
-        const height = this.canvas.clientHeight || 1;
         this.sizeDue = true;
-        const before = this.homeDistance();
-        this.camera.aspect = width / height;
-        this.distance *= this.homeDistance() / before;
-        this.updateProjection();
+        this.fit();
     }
 
     /**
@@ -152,19 +158,38 @@ export class Stage {
     setMargins(left, right, bottom) {
         if (left === this.left && right === this.right && bottom === this.bottom) return;
         Object.assign(this, { left, right, bottom });
-        this.updateProjection();
+        this.fit();
     }
 
-    updateProjection() {
-        const width = this.canvas.clientWidth || 1;
-        const height = this.canvas.clientHeight || 1;
-        const drawn = HOME_SHARE * height * this.narrow(); // diagonal of the scene in the first view
-        const fits = [1, (width - this.left - this.right) / Math.min(width, drawn), (height - this.bottom) / drawn];
-        this.camera.zoom = Math.max(ZOOM_MIN, Math.min(...fits));
-        if (this.left === this.right && !this.bottom) this.camera.clearViewOffset();
-        else this.camera.setViewOffset(width, height, (this.right - this.left) / 2, this.bottom / 2, width, height);
-        this.camera.updateProjectionMatrix();
+    /** shows other panes @param {ViewPane[]} panes from left to right */
+    setPanes(panes) {
+        this.panes = panes;
+        if (!panes.includes(this.pane)) this.pane = panes[0];
+        this.fit();
+    }
+
+    /** fits the views into their panes */
+    fit() {
+        for (const pane of this.panes) pane.fit(this.canvas, this.left, this.right, this.bottom);
+        this.placeCameras();
         this.dirty = true;
+    }
+
+    /** the pane at a point of the page @param {number} x @param {number} y client pixels */
+    paneAt(x, y) {
+        const { left, top } = this.canvas.getBoundingClientRect();
+        const inside = (/** @type {ViewPane} */ pane) => {
+            const box = pane.box(this.canvas);
+            return x - left < box.x + box.width && y - top < box.y + box.height;
+        };
+        return this.panes.find(inside) ?? this.pane;
+    }
+
+    /** the pane under the pointer takes the input @param {{clientX: number, clientY: number}} pointer */
+    choose({ clientX, clientY }) {
+        const pane = this.paneAt(clientX, clientY);
+        if (pane !== this.pane) this.dirty = true; // names stand in the pane that is worked in
+        this.pane = pane;
     }
 
     /** two unit vectors normal to up @returns {[THREE.Vector3, THREE.Vector3]} */
@@ -175,70 +200,61 @@ export class Stage {
         return [a, new THREE.Vector3().crossVectors(this.up, a)];
     }
 
+    home() {
+        this.view.home();
+        this.dirty = true;
+    }
+
     /** turn by pixels @param {number} dx @param {number} dy */
     orbit(dx, dy) {
-        this.azimuth -= (dx / this.canvas.clientHeight) * 4;
-        this.elevation = Math.max(-1.5, Math.min(1.5, this.elevation + (dy / this.canvas.clientHeight) * 4));
+        this.view.orbit(dx / this.canvas.clientHeight, dy / this.canvas.clientHeight);
         this.dirty = true;
     }
 
     /** @param {number} factor of the distance */
     zoom(factor) {
-        this.distance = Math.max(0.15 * this.size, Math.min(12 * this.size, this.distance * factor));
+        this.view.zoom(factor);
         this.dirty = true;
     }
 
     /** moves the target point by pixels @param {number} dx @param {number} dy */
     pan(dx, dy) {
-        const perPixel =
-            ((2 / this.camera.zoom) * this.distance * Math.tan((this.camera.fov * Math.PI) / 360)) /
-            this.canvas.clientHeight;
-        const e = this.camera.matrixWorld.elements;
-        this.target.x += (-dx * e[0] + dy * e[4]) * perPixel;
-        this.target.y += (-dx * e[1] + dy * e[5]) * perPixel;
-        this.target.z += (-dx * e[2] + dy * e[6]) * perPixel;
+        this.view.pan(dx / this.canvas.clientHeight, dy / this.canvas.clientHeight);
         this.dirty = true;
     }
 
-    placeCamera() {
-        const [a, b] = this.ground();
-        const flat = a.clone().multiplyScalar(Math.sin(this.azimuth)).addScaledVector(b, -Math.cos(this.azimuth));
-        const away = flat.multiplyScalar(Math.cos(this.elevation)).addScaledVector(this.up, Math.sin(this.elevation));
-        this.camera.position.copy(this.target).addScaledVector(away, this.distance);
-        this.camera.up.copy(this.up);
-        this.camera.near = Math.max(1e-3 * this.size, this.distance - 3 * this.size);
-        this.camera.far = this.distance + 4 * this.size;
-        this.camera.lookAt(this.target);
-        this.camera.updateProjectionMatrix();
-        this.camera.updateMatrixWorld();
-        // the lights move with the camera, so that the visible side is lit
-        const right = new THREE.Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0);
+    placeCameras() {
+        for (const pane of this.panes) pane.place();
+    }
+
+    /** the lights move with the camera, so that the visible side is lit @param {OrbitView} view */
+    placeLights({ camera, target }) {
+        const right = new THREE.Vector3().setFromMatrixColumn(camera.matrixWorld, 0);
+        const away = new THREE.Vector3().setFromMatrixColumn(camera.matrixWorld, 2);
         this.key.position
-            .copy(this.target)
+            .copy(target)
             .addScaledVector(this.up, 1.2)
             .addScaledVector(right, -0.7)
             .addScaledVector(away, 0.9);
-        this.key.target.position.copy(this.target);
         this.rim.position
-            .copy(this.target)
+            .copy(target)
             .addScaledVector(this.up, 0.5)
             .addScaledVector(right, 1.1)
             .addScaledVector(away, -1.0);
-        this.rim.target.position.copy(this.target);
         this.fill.position
-            .copy(this.target)
+            .copy(target)
             .addScaledVector(away, 1)
             .addScaledVector(this.up, -0.6)
             .addScaledVector(right, 0.35);
-        this.fill.target.position.copy(this.target);
-        this.fill.target.updateMatrixWorld();
-        this.key.target.updateMatrixWorld();
-        this.rim.target.updateMatrixWorld();
+        for (const light of [this.key, this.rim, this.fill]) {
+            light.target.position.copy(target);
+            light.target.updateMatrixWorld();
+        }
     }
 
     /** is the last picture finished, and its pause over? */
     ready() {
-        return this.pace.ready(performance.now());
+        return this.immersive !== null || this.pace.ready(performance.now());
     }
 
     /** a canvas that gets another size is blank until it is drawn, so both happen in one turn */
@@ -249,14 +265,35 @@ export class Stage {
         this.renderer.setSize(this.canvas.clientWidth || 1, this.canvas.clientHeight || 1, false);
     }
 
+    /** draws the whole canvas as a camera sees the scene @param {THREE.PerspectiveCamera} camera */
+    render(camera) {
+        if (this.effects && this.view.kind === "free") this.effects.render(camera);
+        else this.renderer.render(this.scene, camera);
+    }
+
+    drawPanes() {
+        if (this.panes.length === 1) return this.view.draw(this.camera, () => this.render(this.camera));
+        this.renderer.setScissorTest(true);
+        for (const pane of this.panes) {
+            const { x, y, width, height } = pane.box(this.canvas);
+            const below = (this.canvas.clientHeight || 1) - y - height;
+            this.renderer.setViewport(x, below, width, height);
+            this.renderer.setScissor(x, below, width, height);
+            pane.view.draw(pane.camera, () => this.renderer.render(this.scene, pane.camera));
+        }
+        this.renderer.setScissorTest(false);
+        this.renderer.setViewport(0, 0, this.canvas.clientWidth || 1, this.canvas.clientHeight || 1);
+    }
+
     /** draws when something changed */
     draw() {
         if (!this.dirty) return;
         this.dirty = false;
+        if (this.immersive) return this.immersive.draw();
         this.applySize();
-        this.placeCamera();
+        this.placeCameras();
         this.pace.begin(performance.now());
-        this.renderer.render(this.scene, this.camera);
+        this.drawPanes();
         // drawing continues after render returns: the fence signals its end
         const gl = /** @type {WebGL2RenderingContext} */ (this.renderer.getContext());
         const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -268,47 +305,43 @@ export class Stage {
             }
             gl.deleteSync(fence);
             if (this.pace.done(performance.now())) this.resize();
+            this.effects?.take(this.pace.costMs);
         };
         setTimeout(poll, POLL_MS);
     }
 
     /** of a metre at the depth of the middle of the view */
     pixelsPerMetre() {
-        const half = Math.tan((this.camera.fov * Math.PI) / 360) * this.distance;
-        return ((this.canvas.clientHeight || 1) * this.camera.zoom) / (2 * half);
+        const half = Math.tan((this.camera.fov * Math.PI) / 360) * this.view.depth();
+        return (this.pane.box(this.canvas).height * this.camera.zoom) / (2 * half);
     }
 
     /** ray through a pixel @param {number} x @param {number} y client pixels @returns {THREE.Ray} */
     ray(x, y) {
-        const box = this.canvas.getBoundingClientRect();
-        const ndc = new THREE.Vector2(((x - box.left) / box.width) * 2 - 1, 1 - ((y - box.top) / box.height) * 2);
-        this.placeCamera();
+        const outer = this.canvas.getBoundingClientRect();
+        const box = this.pane.box(this.canvas);
+        const ndc = new THREE.Vector2(
+            ((x - outer.left - box.x) / box.width) * 2 - 1,
+            1 - ((y - outer.top - box.y) / box.height) * 2,
+        );
+        this.placeCameras();
         const caster = new THREE.Raycaster();
         caster.setFromCamera(ndc, this.camera);
         return caster.ray;
+    }
+
+    /** is a pixel part of the picture, not of its surround? @param {number} x @param {number} y client pixels */
+    sees(x, y) {
+        const outer = this.canvas.getBoundingClientRect();
+        const box = this.pane.box(this.canvas);
+        return this.view.sees(x - outer.left - box.x, y - outer.top - box.y);
     }
 
     /** client pixels of a point, null behind the camera @param {THREE.Vector3} point @returns {{x: number, y: number} | null} */
     project(point) {
         const p = point.clone().project(this.camera);
         if (p.z > 1) return null;
-        return { x: ((p.x + 1) / 2) * this.canvas.clientWidth, y: ((1 - p.y) / 2) * this.canvas.clientHeight };
+        const { x, y, width, height } = this.pane.box(this.canvas);
+        return { x: x + ((p.x + 1) / 2) * width, y: y + ((1 - p.y) / 2) * height };
     }
-}
-
-/** @returns {THREE.Texture} a dark vertical gradient */
-/** @param {boolean} light */
-function makeBackdrop(light) {
-    const canvas = document.createElement("canvas");
-    canvas.width = 2;
-    canvas.height = 256;
-    const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
-    const gradient = context.createLinearGradient(0, 0, 0, 256);
-    const colours = light ? ["#eef3f7", "#dde5ec", "#c3ced8"] : ["#1d2831", "#141b22", "#0b0f13"];
-    [0, 0.55, 1].forEach((at, i) => gradient.addColorStop(at, colours[i]));
-    context.fillStyle = gradient;
-    context.fillRect(0, 0, 2, 256);
-    const texture = new THREE.CanvasTexture(canvas);
-    texture.colorSpace = THREE.SRGBColorSpace;
-    return texture;
 }

@@ -1,11 +1,11 @@
-// The material of tissue: a glossy layer over a soft, slightly translucent body. The shader mixes in the colours of a
+// The material of a body: the surface of its look (tissue_shader.js) under a wet film. The shader mixes in the colours of a
 // field, half of them as emission, so that they match the legend on every side.
 import { MAP_COLOUR, SEQUENTIAL } from "./colour_maps.js";
 import * as THREE from "./three.js";
+import { tissueShader } from "./tissue_shader.js";
 
-/** with colours highlights are faint: they would hide the values */
-export const WET = { clearcoat: 0.55, sheen: 0.35, specularIntensity: 0.55 };
-export const MATT = { clearcoat: 0.06, sheen: 0.02, specularIntensity: 0.3 };
+/** with the colours of a field highlights are faint: they would hide the values */
+export const MATT = { clearcoat: 0.06, specularIntensity: 0.3 };
 
 /**
  * @typedef {{mix: {value: number}, range: {value: THREE.Vector2}, older: {value: THREE.Vector2}, newer: {value: THREE.Vector2},
@@ -25,19 +25,22 @@ export function makeUniforms() {
     };
 }
 
-/** @param {ColourUniforms} uniforms */
-export function makeTissue(uniforms) {
+/** @param {ColourUniforms} uniforms @param {import("./tissue_looks.js").Look} look */
+export function makeTissue(uniforms, look) {
+    const wet = { clearcoat: look.wet, specularIntensity: 0.55 };
     const material = new THREE.MeshPhysicalMaterial({
-        color: 0x82352b,
-        roughness: 0.5,
+        color: look.colour,
+        roughness: look.roughness,
         metalness: 0,
-        clearcoatRoughness: 0.28,
-        sheenRoughness: 0.5,
-        sheenColor: new THREE.Color(0xd98a7a),
+        clearcoatRoughness: look.filmRoughness,
         side: THREE.DoubleSide,
-        ...WET,
+        ...wet,
     });
+    material.userData.wet = wet; // without a field
+    const surface = tissueShader(look);
+    Object.assign(/** @type {{defines: object}} */ (/** @type {unknown} */ (material)).defines, surface.defines);
     material.onBeforeCompile = (shader) => {
+        surface.extend(shader);
         shader.uniforms.mapMix = uniforms.mix;
         shader.uniforms.mapRange = uniforms.range;
         shader.uniforms.mapOlder = uniforms.older;
@@ -61,21 +64,11 @@ varying float vField;
 varying vec3 vRest;
 uniform float mapMix;
 uniform vec2 mapRange;
-${MAP_COLOUR}
-// value noise at rest positions: faint lobules that move with the tissue
-float lattice(vec3 p) { return fract(sin(dot(p, vec3(127.1, 311.7, 74.7))) * 43758.5453); }
-float mottle(vec3 p) {
-  vec3 i = floor(p), f = fract(p);
-  f = f * f * (3.0 - 2.0 * f);
-  return mix(mix(mix(lattice(i), lattice(i + vec3(1, 0, 0)), f.x), mix(lattice(i + vec3(0, 1, 0)), lattice(i + vec3(1, 1, 0)), f.x), f.y),
-             mix(mix(lattice(i + vec3(0, 0, 1)), lattice(i + vec3(1, 0, 1)), f.x), mix(lattice(i + vec3(0, 1, 1)), lattice(i + vec3(1, 1, 1)), f.x), f.y), f.z);
-}`,
+${MAP_COLOUR}`,
             )
             .replace(
                 "#include <color_fragment>",
                 `#include <color_fragment>
-float shade = 0.86 + 0.14 * mottle(vRest * 160.0) + 0.10 * mottle(vRest * 45.0);
-diffuseColor.rgb *= shade;
 vec3 shown = mapColour((vField - mapRange.x) / (mapRange.y - mapRange.x));
 diffuseColor.rgb = mix(diffuseColor.rgb, 0.5 * shown, mapMix);`,
             )

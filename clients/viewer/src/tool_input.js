@@ -46,8 +46,15 @@ export class ToolInput {
         c.addEventListener("contextmenu", (e) => e.preventDefault());
         c.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
         c.addEventListener("dblclick", (e) => {
-            if (!this.pick(stage.ray(e.clientX, e.clientY))) stage.home();
+            stage.choose(e);
+            if (!this.hit(e)) stage.home();
         });
+    }
+
+    /** what is under a point of the page @param {{clientX: number, clientY: number}} e */
+    hit(e) {
+        const { stage } = this;
+        return stage.sees(e.clientX, e.clientY) ? this.pick(stage.ray(e.clientX, e.clientY)) : null;
     }
 
     /** @param {PointerEvent} e */
@@ -60,19 +67,20 @@ export class ToolInput {
             this.clickStart = null;
             return;
         }
+        this.stage.choose(e);
         this.clickStart = null;
         if (this.mode === "sculpt") {
-            const at = e.button === 0 ? this.pick(this.stage.ray(e.clientX, e.clientY)) : null;
+            const at = e.button === 0 ? this.hit(e) : null;
             if (at) this.clickStart = { id: e.pointerId, at: at.point.toArray(), x: e.clientX, y: e.clientY };
             c.classList.add("busy");
             return;
         }
-        const hit = this.enabled && e.button !== 1 ? this.pick(this.stage.ray(e.clientX, e.clientY)) : null;
+        const hit = this.enabled && e.button !== 1 ? this.hit(e) : null;
         c.classList.add("busy");
         if (!hit) return;
         this.held = null;
         const press = this.mode === "press" || e.button === 2 || e.shiftKey;
-        const into = hit.point.clone().sub(this.stage.camera.position).normalize();
+        const into = this.stage.ray(e.clientX, e.clientY).direction;
         this.drag = {
             id: e.pointerId,
             grasp: !press,
@@ -94,6 +102,7 @@ export class ToolInput {
     move(e) {
         const last = this.pointers.get(e.pointerId);
         if (!last) {
+            this.stage.choose(e);
             if (e.pointerType === "mouse")
                 this.stage.canvas.classList.toggle("over", (this.enabled || this.mode === "sculpt") && this.hover(e));
             return;
@@ -125,7 +134,7 @@ export class ToolInput {
         const now = performance.now();
         if (now - (this.hoverAt ?? 0) > 66) {
             this.hoverAt = now;
-            this.hoverWas = !!this.pick(this.stage.ray(e.clientX, e.clientY));
+            this.hoverWas = !!this.hit(e);
         }
         return !!this.hoverWas;
     }
@@ -162,14 +171,19 @@ export class ToolInput {
         if (this.drag) {
             this.drag.deeper -= amount * 1e-4 * this.stage.size;
             this.tick();
-        } else this.stage.zoom(Math.exp(amount * 0.0012));
+        } else {
+            this.stage.choose(e);
+            this.stage.zoom(Math.exp(amount * 0.0012));
+        }
     }
 
     /** turns the instrument about its shaft @param {number} angle rad */
     roll(angle) {
-        if (!this.drag?.hand) return;
-        this.drag.hand = { ...this.drag.hand, roll: this.drag.hand.roll + angle };
-        this.tick();
+        const held = this.drag ?? this.held;
+        if (!held?.hand) return;
+        held.hand = { ...held.hand, roll: held.hand.roll + angle };
+        if (this.drag) this.tick();
+        else if (this.held) this.hold(this.held);
     }
 
     /** updates the target; also called while the pointer rests, because a press deepens over time */

@@ -109,6 +109,21 @@ test("offers its ticket beside the protocol, where no address shows it", () => {
     assert.equal(s.sockets[0].url, "ws://host:1/ws");
 });
 
+test("a second hand asks for no shape and takes none, but acknowledges", () => {
+    const s = stand();
+    s.link.connect({ url: "ws://host/ws", name: "Ada (2)", role: "trainee", ticket: "", toolOnly: true });
+    const [socket] = s.sockets;
+    socket.accept();
+    assert.equal(socket.texts()[0].topology_deltas, false);
+    socket.receive(hello());
+    socket.receive(load("frame_rest.bin"));
+    socket.receive(load("tools.bin"));
+    assert.deepEqual(s.asked, []);
+    assert.deepEqual(s.of("frame"), []);
+    assert.equal(s.of("tools").length, 1);
+    assert.equal(socket.binary(KIND.ACK).length, 1);
+});
+
 test("keeps the newest frame until its asset has come, then shows it", async () => {
     const { s, part } = await joined();
     assert.equal(s.asked.at(-1), "http://host:1/asset/ab");

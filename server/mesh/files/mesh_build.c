@@ -32,8 +32,24 @@ pal_err pal_mesh_position(pal_mesh_build *build, pal_text_scan *scan, const char
     return pal_mesh_vertex(build, p);
 }
 
+pal_err pal_mesh_image_point(pal_mesh_build *build, const double uv[2])
+{
+    if (build->n_vt >= (size_t)max_piece)
+        return pal_diagnostic_set(build->diag, PAL_ERR_BUDGET, "%s: more than %zu pieces", build->name, max_piece);
+    if (!pal_heap_grow(&build->vt, build->n_vt, 2 * sizeof *uv))
+        return pal_diagnostic_set(build->diag, PAL_ERR_MEMORY, "%s: no memory for more than %zu pieces", build->name,
+                                  build->n_vt);
+    memcpy(build->vt + 2 * build->n_vt++, uv, 2 * sizeof *uv);
+    return PAL_ERR_OK;
+}
+
 static pal_err add_triangle(pal_mesh_build *build, int64_t a, int64_t b, int64_t c)
 {
+    if (build->takes_image) {
+        PAL_TRY(grow(build, &build->tri_vt, build->n_tri, sizeof *build->tri_vt));
+        int32_t *vt = build->tri_vt + 3 * build->n_tri;
+        vt[0] = build->fan_first_vt, vt[1] = build->fan_last_vt, vt[2] = build->corner_vt;
+    }
     PAL_TRY(grow(build, &build->tri, build->n_tri, sizeof *build->tri));
     int32_t *tri = build->tri + 3 * build->n_tri++;
     tri[0] = (int32_t)a, tri[1] = (int32_t)b, tri[2] = (int32_t)c;
@@ -57,9 +73,9 @@ pal_err pal_mesh_fan_corner(pal_mesh_build *build, int64_t at, int64_t index)
         build->max_index_at = at;
     }
     if (build->fan_n < 3) build->fan_n++;
-    if (build->fan_n == 1) build->fan_first = index;
+    if (build->fan_n == 1) build->fan_first = index, build->fan_first_vt = build->corner_vt;
     if (build->fan_n == 3) PAL_TRY(add_triangle(build, build->fan_first, build->fan_last, index));
-    build->fan_last = index;
+    build->fan_last = index, build->fan_last_vt = build->corner_vt;
     return PAL_ERR_OK;
 }
 

@@ -15,9 +15,16 @@ typedef struct pal_mesh_build {
     double *x;          /* [n_vertex][3]                                                   */
     int32_t *tri;       /* [n_tri][3], indices not yet checked against n_vertex            */
     size_t n_vertex, n_tri;
-    int64_t max_index, max_index_at; /* largest index of any face (-1 at first) and its place      */
-    int64_t first_at;                /* place of the first face, 0: none yet                       */
-    int64_t fan_first, fan_last;     /* the open polygon                                           */
+    /* OBJ: image coordinates and those of the corners (-1: none), while takes_image */
+    bool takes_image;
+    double *vt;      /* [n_vt][2]                                                       */
+    int32_t *tri_vt; /* [n_tri][3], indices not yet checked against n_vt                */
+    size_t n_vt;
+    char library[128], material[128];             /* file of materials, first material; "": none             */
+    int64_t max_index, max_index_at;              /* largest index of any face (-1 at first) and its place      */
+    int64_t first_at;                             /* place of the first face, 0: none yet                       */
+    int64_t fan_first, fan_last;                  /* the open polygon                                           */
+    int32_t fan_first_vt, fan_last_vt, corner_vt; /* of the same corners, and of the one that comes */
     int fan_n, fan_n_tri;
 } pal_mesh_build;
 
@@ -35,6 +42,9 @@ pal_err pal_mesh_position(pal_mesh_build *build, pal_text_scan *scan, const char
 void pal_mesh_fan_begin(pal_mesh_build *build, int64_t at);
 pal_err pal_mesh_fan_corner(pal_mesh_build *build, int64_t at, int64_t index);
 pal_err pal_mesh_fan_end(pal_mesh_build *build);
+
+/* image coordinates; what is missing is 0. BUDGET, MEMORY */
+pal_err pal_mesh_image_point(pal_mesh_build *build, const double uv[2]);
 
 /* the readers: from bytes to arrays; REFUSED, MEMORY */
 pal_err pal_obj_parse(pal_mesh_build *build);

@@ -1,6 +1,7 @@
 /* Surfaces from files: which reader, the checks that all formats share, cleaning and units. */
 #include "server/mesh/files/mesh_file.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/mesh_build.h"
@@ -9,6 +10,8 @@
 #include <string.h>
 /* no file is read beyond this */
 static const size_t max_byte = (size_t)4 << 30;
+/* of the diagonal: wider gaps between triangles are openings; a hundred times what is closed */
+static const double max_gap = 1e-3;
 
 typedef pal_err reader(pal_mesh_build *build);
 
@@ -37,6 +40,59 @@ static pal_err parse(pal_mesh_build *build)
     return PAL_ERR_OK;
 }
 
+/* the triangles that have image coordinates at all corners, as they stand in the file */
+static pal_err take_image(const pal_mesh_build *build, pal_image_map *out)
+{
+    pal_err err = PAL_ERR_OK;
+    PAL_ARRAY(&err, out->x, 9 * build->n_tri);
+    PAL_ARRAY(&err, out->uv, 6 * build->n_tri);
+    if (err) return pal_diagnostic_set(build->diag, err, "%s: no memory for image coordinates", build->name);
+    for (size_t t = 0; t < build->n_tri; t++) {
+        const int32_t *vt = build->tri_vt + 3 * t;
+        bool whole = true; /* and no corner is NaN or infinite, which cleaning drops */
+        for (int k = 0; k < 3; k++) {
+            const double *x = build->x + 3 * (size_t)build->tri[3 * t + (size_t)k];
+            whole = whole && vt[k] >= 0 && (size_t)vt[k] < build->n_vt;
+            for (int a = 0; a < 3; a++) whole = whole && fabs(x[a]) < 1e30;
+        }
+        if (!whole) continue;
+        for (int k = 0; k < 3; k++) {
+            memcpy(out->x + 9 * (size_t)out->n_tri + 3 * k, build->x + 3 * (size_t)build->tri[3 * t + (size_t)k],
+                   3 * sizeof *out->x);
+            for (int c = 0; c < 2; c++)
+                out->uv[6 * (size_t)out->n_tri + (size_t)(2 * k + c)] = (float)build->vt[2 * (size_t)vt[k] + (size_t)c];
+        }
+        out->n_tri++;
+    }
+    memcpy(out->library, build->library, sizeof out->library);
+    memcpy(out->material, build->material, sizeof out->material);
+    return PAL_ERR_OK;
+}
+
+/* Refuses triangles that are not connected although their corners nearly meet: more than a tenth of their sides are
+ * open, and welding from farther away closes most of these. */
+static pal_err check_connected(const pal_mesh_build *build, double weld, const pal_surface *s)
+{
+    pal_surface near = {0};
+    pal_surface_report report = {0};
+    pal_surface_topology open = {0}, closer = {0};
+    pal_err err = pal_surface_check(s, &open);
+    if (err || open.n_open_edge <= 0.1 * 3 * s->n_tri) return err;
+    err = pal_surface_copy(s, &near);
+    if (!err) err = pal_surface_clean(&near, max_gap, &report, NULL);
+    if (!err) err = pal_surface_check(&near, &closer);
+    pal_surface_free(&near);
+    if (err == PAL_ERR_MEMORY) return err;
+    if (err || 2 * closer.n_open_edge > open.n_open_edge) return PAL_ERR_OK;
+    double low[3], high[3];
+    pal_surface_box(s, low, high);
+    return PAL_MESH_REFUSE(
+        build, build->first_at,
+        "corners of neighbouring triangles miss each other by up to %.3g in the file's unit, and gaps "
+        "of at most %.3g are closed: join them in the program that wrote the file",
+        report.max_weld_m, weld * pal_dist3(low, high));
+}
+
 /* cleans and scales what was read */
 static pal_err finish(pal_mesh_build *build, const pal_mesh_file_options *options, pal_surface *s,
                       pal_surface_report *report, double *unit_m, const char **unit_name)
@@ -47,13 +103,19 @@ static pal_err finish(pal_mesh_build *build, const pal_mesh_file_options *option
         if (err == PAL_ERR_REFUSED) return PAL_MESH_REFUSE(build, build->first_at, "%s", reason.text);
         if (err) return pal_diagnostic_set(build->diag, err, "%s: %s", build->name, reason.text);
     }
+    if (options->weld > 0) {
+        pal_err err = check_connected(build, options->weld, s);
+        if (err == PAL_ERR_MEMORY) return pal_diagnostic_set(build->diag, err, "%s: no memory to weld", build->name);
+        if (err) return err;
+    }
     double low[3], high[3], unit = options->unit_m;
     const char *word = "given";
     pal_surface_box(s, low, high);
     if (!(unit > 0)) unit = pal_mesh_unit_guess(pal_dist3(low, high), &word);
     for (size_t i = 0; i < 3 * (size_t)s->n_vertex; i++) s->x[i] *= unit;
     pal_scale3(s->origin_m, unit, s->origin_m);
-    if (unit_m) *unit_m = unit;
+    report->max_weld_m *= unit;
+    *unit_m = unit;
     if (unit_name) *unit_name = word;
     return PAL_ERR_OK;
 }
@@ -62,23 +124,37 @@ pal_err pal_mesh_file_parse(const char *name, const uint8_t *bytes, size_t n_byt
                             pal_surface *out, pal_surface_report *report, double *unit_m, const char **unit_name,
                             pal_diagnostic *diag)
 {
-    static const pal_mesh_file_options plain = {0, PAL_MESH_WELD};
+    static const pal_mesh_file_options plain = {.weld = PAL_MESH_WELD};
     char shown[128];
     pal_file_printable_name(shown, name);
-    pal_mesh_build build = {
-        .name = shown, .bytes = bytes, .n_byte = n_byte, .diag = diag, .binary = true, .max_index = -1};
+    if (!options) options = &plain;
+    pal_mesh_build build = {.name = shown,
+                            .bytes = bytes,
+                            .n_byte = n_byte,
+                            .diag = diag,
+                            .binary = true,
+                            .takes_image = options->image != NULL,
+                            .max_index = -1};
+    pal_image_map image = {0};
     pal_err err = parse(&build);
+    if (!err && build.n_vt > 0 && build.tri_vt) err = take_image(&build, &image);
     pal_surface s = {.n_vertex = (int)build.n_vertex, .n_tri = (int)build.n_tri, .x = build.x, .tri = build.tri};
     pal_surface_report found = {.n_vertex_read = (int64_t)build.n_vertex, .n_tri_read = (int64_t)build.n_tri};
     if (!err) {
         snprintf(found.format, sizeof found.format, "%s", build.format);
         snprintf(found.place, sizeof found.place, "%s %lld", build.binary ? "byte" : "line", (long long)build.first_at);
-        err = finish(&build, options ? options : &plain, &s, &found, unit_m, unit_name);
+        double unit = 1;
+        err = finish(&build, options, &s, &found, &unit, unit_name);
+        if (unit_m) *unit_m = unit;
+        for (size_t k = 0; k < 9 * (size_t)image.n_tri; k++) image.x[k] = image.x[k] * unit - s.origin_m[k % 3];
     }
+    PAL_FREE(build.vt, build.tri_vt);
     if (err) {
         pal_surface_free(&s);
+        pal_image_map_free(&image);
         return err;
     }
+    if (options->image) *options->image = image;
     *out = s;
     if (report) *report = found;
     return PAL_ERR_OK;

@@ -3,19 +3,23 @@
  * file's size. Thread: [load]. */
 #ifndef PAL_MESH_FILES_MESH_FILE_H
 #define PAL_MESH_FILES_MESH_FILE_H
-#include "server/mesh/geometry/surface.h"
+#include "server/mesh/geometry/image_map.h"
 #include "server/mesh/geometry/tets.h"
 
-/* default weld: joins vertices that single precision in a file has separated */
-#define PAL_MESH_WELD 1e-6
+/* Default weld, of the diagonal: joins the copies of a vertex that a file writes with each of its triangles. Numbers of
+ * six digits end at 1e-5 of themselves, so copies in the last digit of coordinates of half a diagonal are sqrt(3) 5e-6
+ * apart; single precision leaves 1e-7. Edges of ten times as much stay (tests/mesh/files/test_mesh_file.c) */
+#define PAL_MESH_WELD 1e-5
 
 /* NULL stands for {0, PAL_MESH_WELD} */
 typedef struct pal_mesh_file_options {
-    double unit_m; /* metres per file unit; 0: guess with pal_mesh_unit_guess */
-    double weld;   /* relative tolerance of pal_surface_clean; < 0: do not clean at all */
+    double unit_m;        /* metres per file unit; 0: guess with pal_mesh_unit_guess */
+    double weld;          /* relative tolerance of pal_surface_clean; < 0: do not clean at all */
+    pal_image_map *image; /* becomes where an image lies on the surface, pal_image_map_free; NULL: not asked */
 } pal_mesh_file_options;
 
-/* Reads path, cleans it, scales it to metres; each reader's file says what it takes. unit_name out ("m", "mm",
+/* Reads path, cleans it, scales it to metres; each reader's file says what it takes. Triangles that cleaning leaves
+ * unconnected although their corners nearly meet are refused, with the gap between them. unit_name out ("m", "mm",
  * "scaled", or "given" for options' own) and unit_m out may be NULL. IO, REFUSED, MEMORY. */
 pal_err pal_mesh_file_read(const char *path, const pal_mesh_file_options *options, pal_surface *out,
                            pal_surface_report *report, double *unit_m, const char **unit_name, pal_diagnostic *diag);

@@ -1,6 +1,9 @@
-/* Wavefront OBJ: positions and faces (n-gons as fans, negative indices, v/vt/vn forms, continuation lines); everything
- * else is left out. */
+/* Wavefront OBJ: positions and faces (n-gons as fans, negative indices, v/vt/vn forms, continuation lines); where an
+ * image is asked for, image coordinates, the file of materials and the first material too; everything else is left
+ * out. */
 #include "server/mesh/files/mesh_build.h"
+
+#include <math.h>
 
 static const char *const keywords[] = {"v", "vt", "vn", "vp", "f", "l", "p", "g", "o", "s", "usemtl", "mtllib", "#"};
 
@@ -17,21 +20,29 @@ bool pal_obj_is(const uint8_t *bytes, size_t n_byte)
     return false;
 }
 
-/* the position index of a corner v, v/vt, v//vn or v/vt/vn; false when the word is none of these */
-static bool read_corner(pal_text_scan *scan, int64_t *index)
+/* digits with or without a minus; NULL: none */
+static const uint8_t *read_index(const uint8_t *p, const uint8_t *end, int64_t *index)
 {
-    const uint8_t *p = scan->at, *end = scan->end;
     bool negative = p < end && *p == '-';
     int64_t value = 0;
     const uint8_t *first = p += negative;
     for (; p < end && *p >= '0' && *p <= '9'; p++)
         if (value < (int64_t)1 << 40) value = 10 * value + (*p - '0');
-    if (p == first) return false;
+    *index = negative ? -value : value;
+    return p == first ? NULL : p;
+}
+
+/* the indices of a corner v, v/vt, v//vn or v/vt/vn, of vt 0: none; false when the word is none of these */
+static bool read_corner(pal_text_scan *scan, int64_t *index, int64_t *image)
+{
+    const uint8_t *p = read_index(scan->at, scan->end, index), *end = scan->end;
+    *image = 0;
+    if (!p) return false;
+    if (p < end && *p == '/') (void)read_index(p + 1, end, image);
     if (p < end && *p == '/')
         while (p < end && (*p == '/' || *p == '-' || (*p >= '0' && *p <= '9'))) p++;
     if (p<end && * p> ' ' && *p != '\\') return false;
     scan->at = p;
-    *index = negative ? -value : value;
     return true;
 }
 
@@ -40,13 +51,15 @@ static pal_err read_face(pal_mesh_build *build, pal_text_scan *scan)
     if (!pal_text_more(scan)) return PAL_MESH_REFUSE(build, scan->line, "a face without corners");
     pal_mesh_fan_begin(build, scan->line);
     while (pal_text_more(scan)) {
-        int64_t index;
-        if (!read_corner(scan, &index))
+        int64_t index, image;
+        if (!read_corner(scan, &index, &image))
             return PAL_MESH_REFUSE(build, scan->line, "a face corner is %s", pal_text_excerpt_at(scan).text);
         if (index == 0) return PAL_MESH_REFUSE(build, scan->line, "a face uses vertex 0, the first is 1");
         if (index < 0 && -index > (int64_t)build->n_vertex)
             return PAL_MESH_REFUSE(build, scan->line, "a face uses vertex %lld, only %zu came before", (long long)index,
                                    build->n_vertex);
+        image = image < 0 ? (int64_t)build->n_vt + image : image - 1;
+        build->corner_vt = image < 0 || image > INT32_MAX - 1 ? -1 : (int32_t)image;
         PAL_TRY(pal_mesh_fan_corner(build, scan->line, index < 0 ? (int64_t)build->n_vertex + index : index - 1));
     }
     return pal_mesh_fan_end(build);
@@ -61,6 +74,25 @@ static pal_err skip_line(pal_mesh_build *build, pal_text_scan *scan)
     return PAL_ERR_OK;
 }
 
+static pal_err read_image_point(pal_mesh_build *build, pal_text_scan *scan)
+{
+    double uv[2] = {0, 0};
+    for (int c = 0; c < 2; c++)
+        if (!pal_text_double(scan, &uv[c]) || !(fabs(uv[c]) < 1e6)) uv[c] = 0;
+    return pal_mesh_image_point(build, uv);
+}
+
+/* the first name of its kind: all of the line, as names may have spaces */
+static void read_name(const pal_text_scan *scan, char out[128])
+{
+    pal_text_scan at = *scan;
+    size_t n = 0;
+    if (out[0] || !pal_text_more(&at)) return;
+    for (const uint8_t *p = at.at; p < at.end && *p >= 0x20 && n < 127; p++) out[n++] = (char)*p;
+    while (n > 0 && out[n - 1] == ' ') n--;
+    out[n] = 0;
+}
+
 pal_err pal_obj_parse(pal_mesh_build *build)
 {
     build->format = "obj";
@@ -72,6 +104,12 @@ pal_err pal_obj_parse(pal_mesh_build *build)
             PAL_TRY(pal_mesh_position(build, &scan, "a position"));
         else if (pal_text_is(&scan, "f"))
             PAL_TRY(read_face(build, &scan));
+        else if (build->takes_image && pal_text_is(&scan, "vt"))
+            PAL_TRY(read_image_point(build, &scan));
+        else if (build->takes_image && pal_text_is(&scan, "mtllib"))
+            read_name(&scan, build->library);
+        else if (build->takes_image && pal_text_is(&scan, "usemtl"))
+            read_name(&scan, build->material);
         else
             PAL_TRY(skip_line(build, &scan));
     } while (pal_text_next_line(&scan));

@@ -15,6 +15,7 @@ typedef struct pal_surface {
     double *x;          /* position relative to origin_m, m     [n_vertex][3] */
     int32_t *tri;       /* vertex indices                       [n_tri][3]    */
     double origin_m[3]; /* file position (in m) = x + origin_m                */
+    float *uv; /* place in its image from the lower left corner, NULL: none (volume/image_seams.h) [n_vertex][2] */
 } pal_surface;
 
 /* counts of what reading and cleaning dropped, joined or repaired */
@@ -23,6 +24,7 @@ typedef struct pal_surface_report {
     char place[32];                    /* where the first face or voxel stands: "line 12", "byte 84"; or empty   */
     int64_t n_vertex_read, n_tri_read; /* as stored; polygons count as their triangles                           */
     int64_t n_welded;                  /* vertices joined to an earlier one                                      */
+    double max_weld_m;                 /* farthest that one of them was from it                                  */
     int64_t n_degenerate, n_duplicate; /* triangles dropped: repeated corner or no area; same three corners      */
     int64_t n_nonfinite;               /* triangles dropped because a corner is NaN or infinite                  */
     int64_t n_unused;                  /* vertices of no triangle, dropped                                       */
@@ -35,7 +37,8 @@ void pal_surface_free(pal_surface *surface);
 /* deep copy; MEMORY */
 pal_err pal_surface_copy(const pal_surface *from, pal_surface *to);
 
-/* Joins vertices closer than tolerance (relative to the bounding-box diagonal; 0: equal positions only), drops
+/* Joins each vertex to the first earlier one that stays and is within tolerance (relative to the bounding-box diagonal;
+ * 0: equal positions only). Those that stay are farther apart, so that no chain of vertices contracts. Drops
  * degenerate, duplicate and non-finite triangles and unused vertices, recentres, and adds the counts to report (may be
  * NULL). In place. REFUSED when no triangle is left, MEMORY. */
 pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_report *report, pal_diagnostic *diag);
@@ -59,7 +62,7 @@ typedef struct pal_surface_side {
  * start [n_vertex+1], side [3 n_tri]; the caller frees both; MEMORY */
 pal_err pal_surface_sides(const pal_surface *surface, int32_t **start, pal_surface_side **side);
 
-/* drops vertices of no triangle and keeps the order of the others; map [n_vertex] is scratch */
+/* drops vertices of no triangle, and uv, and keeps the order of the others; map [n_vertex] is scratch */
 void pal_surface_drop_unused(pal_surface *surface, int32_t *map);
 
 /* edge-connected components: label of each triangle [n_tri] (caller's memory), number out; MEMORY */

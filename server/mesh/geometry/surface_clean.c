@@ -95,6 +95,7 @@ static void weld_vertex(cleaner *k, int32_t i)
     if (partner >= 0) {
         k->map[i] = partner;
         k->count->n_welded++;
+        k->count->max_weld_m = fmax(k->count->max_weld_m, pal_dist3(p, k->surface->x + 3 * (size_t)partner));
         return;
     }
     k->map[i] = i;

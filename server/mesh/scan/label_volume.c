@@ -26,7 +26,7 @@ typedef struct header {
     size_t offset;                 /* of the first voxel           */
     pal_scalar type;
     bool big;
-    const char *format;
+    const char *format, *axes; /* axes "": not known */
 } header;
 
 typedef struct source {
@@ -117,7 +117,8 @@ static void qform(const uint8_t *b, bool big, const double size[3], double unit,
     }
 }
 
-static void nifti_axes(const uint8_t *b, bool big, double m[12])
+/* false: the file states sizes of voxels alone, and no directions */
+static bool nifti_axes(const uint8_t *b, bool big, double m[12])
 {
     int code = b[123] & 7;
     double unit = code == 1 ? 1 : code == 3 ? 1e-6 : 1e-3, size[3];
@@ -128,7 +129,9 @@ static void nifti_axes(const uint8_t *b, bool big, double m[12])
         qform(b, big, size, unit, m);
     } else {
         for (int k = 0; k < 12; k++) m[k] = k % 5 == 0 ? unit * size[k / 5] : 0;
+        return false;
     }
+    return true;
 }
 
 /* finite, not flat, and voxels between a nanometre and a kilometre */
@@ -185,7 +188,7 @@ static pal_err nifti_header(const source *s, const uint8_t *b, size_t n, header 
     h->shift = pal_float_at(b + 116, big);
     if (!isfinite(h->slope) || !isfinite(h->shift)) return REFUSE(s, "byte", 112, "the scale is not finite");
     if (h->slope == 0) h->slope = 1, h->shift = 0;
-    nifti_axes(b, big, h->to_m);
+    h->axes = nifti_axes(b, big, h->to_m) ? "RAS" : "";
     return axes_usable(h->to_m) ? PAL_ERR_OK : REFUSE(s, "byte", 76, "the voxel axes are flat or not finite");
 }
 
@@ -261,7 +264,7 @@ static pal_err inr_check(const source *s, const inr_words *w, header *h)
 
 static pal_err inr_header(const source *s, const uint8_t *b, size_t n, header *h)
 {
-    *h = (header){.slope = 1, .format = "inr"};
+    *h = (header){.slope = 1, .format = "inr", .axes = ""};
     /* the header fills blocks of 256 bytes and ends with the last one */
     for (size_t end = 256; end <= n && h->offset == 0; end += 256)
         if (memcmp(b + end - 4, "##}\n", 4) == 0) h->offset = end;
@@ -347,6 +350,7 @@ static pal_err read_voxels(const source *s, const header *h, pal_label_volume *o
     memcpy(out->to_m, h->to_m, sizeof out->to_m);
     out->first_byte = (int64_t)h->offset;
     snprintf(out->format, sizeof out->format, "%s", h->format);
+    snprintf(out->axes, sizeof out->axes, "%s", h->axes);
     return PAL_ERR_OK;
 }
 

@@ -14,6 +14,8 @@ typedef struct pal_label_volume {
     int32_t *label;     /* [n2][n1][n0]; non-integer voxels are rounded          */
     int64_t first_byte; /* of the voxels in the file, unpacked                */
     char format[16];    /* "nifti" | "inr"                                    */
+    char axes[4];       /* where x, y and z in metres point in the patient: "RAS" of a NIfTI with sform or qform; "":
+                           not known */
 } pal_label_volume;
 
 pal_err pal_label_volume_read(const char *path, pal_label_volume *out, pal_diagnostic *diag);

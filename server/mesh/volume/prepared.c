@@ -4,7 +4,8 @@
  * each at a multiple of 64. The checksum is of all that follows the head. The counts alone fix every section's size, so
  * a file is either whole or refused, and no more is taken from the heap than the file has bytes. Of the hexahedra only
  * a measured fill is kept: their corners follow from the tetrahedra. A mesh without skin frames binds no vertex to any,
- * so that a surface alone has counts of 0 but its own. Version 2 has no fill, hence one count and one section less. */
+ * so that a surface alone has counts of 0 but its own. Version 2 has no fill, hence one count and one section less;
+ * only a surface with image coordinates is written as version 4, with a count and a section more. */
 #include "server/mesh/volume/prepared.h"
 
 #include "server/base/clock.h"
@@ -18,8 +19,9 @@
 #error "the prepared file is copied from memory: a big-endian machine needs a swap here"
 #endif
 
-enum { VERSION = 3, N_COUNT = 8, N_SECTION = 15 };
-enum { VERSION_2 = 2, N_COUNT_2 = 7, N_SECTION_2 = 14 };
+/* VERSION is written where there are no image coordinates, VERSION + 1 where there are; each version has one count and
+ * one section more than the one before */
+enum { VERSION_MIN = 2, VERSION = 3, VERSION_MAX = 4, N_COUNT = 9, N_SECTION = 16 };
 static const char MAGIC[8] = "PALPREP1";
 
 typedef struct head {
@@ -44,8 +46,8 @@ typedef struct layout {
 
 static layout layout_of(uint32_t version)
 {
-    int n_count = version == VERSION_2 ? N_COUNT_2 : N_COUNT;
-    return (layout){n_count, version == VERSION_2 ? N_SECTION_2 : N_SECTION, (size_t)HEAD + 8 * (size_t)n_count + 32};
+    const int fewer = version >= VERSION_MIN && version <= VERSION_MAX ? VERSION_MAX - (int)version : 0;
+    return (layout){N_COUNT - fewer, N_SECTION - fewer, (size_t)HEAD + 8 * (size_t)(N_COUNT - fewer) + 32};
 }
 
 /* one array of a prepared mesh: where it is kept, its item size and how many items the counts call for */
@@ -58,7 +60,7 @@ typedef struct section {
 static void list_sections(pal_prepared *p, const uint64_t count[N_COUNT], section out[N_SECTION])
 {
     uint64_t n_vertex = count[0], n_tri = count[1], n_node = count[2], n_tet = count[3], n_face = count[4],
-             n_frame = count[5], n_fan = count[6], n_fill = count[7],
+             n_frame = count[5], n_fan = count[6], n_fill = count[7], n_uv = count[8],
              n_near = n_frame ? PAL_SKIN_NEIGHBOURS * n_vertex : 0;
     const section all[N_SECTION] = {{&p->surface.x, 8, 3 * n_vertex},
                                     {&p->surface.tri, 4, 3 * n_tri},
@@ -74,7 +76,8 @@ static void list_sections(pal_prepared *p, const uint64_t count[N_COUNT], sectio
                                     {&p->skin.fan, 4, 2 * n_fan},
                                     {&p->skin.near, 4, n_near},
                                     {&p->skin.coef, 4, 4 * n_near},
-                                    {&p->hexes.fill, 4, n_fill}};
+                                    {&p->hexes.fill, 4, n_fill},
+                                    {&p->surface.uv, 4, 2 * n_uv}};
     memcpy(out, all, sizeof all);
 }
 
@@ -82,8 +85,15 @@ static void get_counts(const pal_prepared *p, uint64_t count[N_COUNT])
 {
     const int32_t *fan_start = p->skin.fan_start;
     const int n_fan = fan_start ? fan_start[p->skin.n_frame] : 0, n_fill = p->hexes.measured ? p->hexes.n_hex : 0;
-    const int n[N_COUNT] = {p->surface.n_vertex, p->surface.n_tri, p->tets.n_node, p->tets.n_tet,
-                            p->tets.n_face,      p->skin.n_frame,  n_fan,          n_fill};
+    const int n[N_COUNT] = {p->surface.n_vertex,
+                            p->surface.n_tri,
+                            p->tets.n_node,
+                            p->tets.n_tet,
+                            p->tets.n_face,
+                            p->skin.n_frame,
+                            n_fan,
+                            n_fill,
+                            p->surface.uv ? p->surface.n_vertex : 0};
     for (int k = 0; k < N_COUNT; k++) count[k] = (uint64_t)n[k];
 }
 
@@ -194,23 +204,24 @@ static size_t round_up(size_t n)
 pal_err pal_prepared_bytes(const pal_prepared *prepared, uint8_t **bytes_out, size_t *n_byte_out)
 {
     pal_prepared p = *prepared;
-    layout l = layout_of(VERSION);
+    const uint32_t version = p.surface.uv ? VERSION_MAX : VERSION;
+    layout l = layout_of(version);
     uint64_t count[N_COUNT];
     section s[N_SECTION];
     get_counts(&p, count);
     list_sections(&p, count, s);
-    size_t n_byte = round_up(l.table + ENTRY * N_SECTION);
-    for (int k = 0; k < N_SECTION; k++) n_byte += round_up(s[k].n * s[k].n_byte);
+    size_t n_byte = round_up(l.table + ENTRY * (size_t)l.n_section);
+    for (int k = 0; k < l.n_section; k++) n_byte += round_up(s[k].n * s[k].n_byte);
     uint8_t *bytes = calloc(n_byte, 1);
     if (!bytes) return PAL_ERR_MEMORY;
 
-    head h = {.version = VERSION, .n_section = N_SECTION, .n_byte = n_byte};
+    head h = {.version = version, .n_section = (uint32_t)l.n_section, .n_byte = n_byte};
     memcpy(h.magic, MAGIC, sizeof h.magic);
-    memcpy(bytes + HEAD, count, sizeof count);
-    memcpy(bytes + HEAD + 8 * N_COUNT, p.tets.origin_m, 24);
-    memcpy(bytes + HEAD + 8 * N_COUNT + 24, &p.tets.edge_m, 8);
-    size_t at = round_up(l.table + ENTRY * N_SECTION);
-    for (int k = 0; k < N_SECTION; k++) {
+    memcpy(bytes + HEAD, count, 8 * (size_t)l.n_count);
+    memcpy(bytes + l.table - 32, p.tets.origin_m, 24);
+    memcpy(bytes + l.table - 8, &p.tets.edge_m, 8);
+    size_t at = round_up(l.table + ENTRY * (size_t)l.n_section);
+    for (int k = 0; k < l.n_section; k++) {
         entry e = {(uint32_t)k + 1, (uint32_t)s[k].n_byte, s[k].n, at};
         memcpy(bytes + l.table + (size_t)ENTRY * (size_t)k, &e, ENTRY);
         void *array;
@@ -302,6 +313,8 @@ static const char *find_fault(const pal_prepared *p, const uint64_t count[N_COUN
         if (tets->on_surface[i] > 1) return "a surface tag is neither 0 nor 1";
     for (uint64_t i = 0; i < count[7]; i++)
         if (!(p->hexes.fill[i] >= 0 && p->hexes.fill[i] <= 1)) return "a voxel's fill is not within 0..1";
+    if (count[8] && count[8] != count[0]) return "not every vertex has image coordinates";
+    if (!all_finite_float(surface->uv, 2 * count[8])) return "an image coordinate is not finite";
     return NULL;
 }
 
@@ -312,9 +325,10 @@ static pal_err read_head(const char *name, const uint8_t *bytes, size_t n_byte, 
     if (n_byte >= HEAD) memcpy(&h, bytes, HEAD);
     if (memcmp(h.magic, MAGIC, sizeof h.magic)) return PAL_REFUSE(diag, "%s: byte 0: not a prepared mesh", name);
     *l = layout_of(h.version);
-    if ((h.version != VERSION && h.version != VERSION_2) || h.n_section != (uint32_t)l->n_section)
-        return PAL_REFUSE(diag, "%s: byte 8: version %u with %u sections, this program reads %d with %d and %d with %d",
-                          name, h.version, h.n_section, VERSION, N_SECTION, VERSION_2, N_SECTION_2);
+    if (h.version < VERSION_MIN || h.version > VERSION_MAX || h.n_section != (uint32_t)l->n_section)
+        return PAL_REFUSE(diag, "%s: byte 8: version %u with %u sections, this program reads %d with %d to %d with %d",
+                          name, h.version, h.n_section, VERSION_MIN, N_SECTION + VERSION_MIN - VERSION_MAX, VERSION_MAX,
+                          N_SECTION);
     if (h.n_byte != n_byte || n_byte < l->table + ENTRY * (size_t)l->n_section)
         return PAL_REFUSE(diag, "%s: byte 16: %llu bytes announced, %zu are there", name, (unsigned long long)h.n_byte,
                           n_byte);
@@ -385,6 +399,10 @@ pal_err pal_prepared_parse(const char *name, const uint8_t *bytes, size_t n_byte
     if (!err) {
         const uint8_t *place = bytes + l.table - 32;
         put_counts(&p, count);
+        if (!count[8]) {
+            free(p.surface.uv);
+            p.surface.uv = NULL;
+        }
         memcpy(p.tets.origin_m, place, 24);
         memcpy(p.surface.origin_m, p.tets.origin_m, 24);
         memcpy(&p.tets.edge_m, place + 24, 8);

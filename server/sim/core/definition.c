@@ -246,10 +246,12 @@ static pal_err check_body(const pal_scene *scene, int index, pal_diagnostic *dia
 
 pal_err pal_scene_check(const pal_scene *scene, pal_diagnostic *diag)
 {
-    if (!(scene->step_s >= 1e-4 && scene->step_s <= 0.1))
+    if (!(scene->step_s >= PAL_STEP_MIN_S && scene->step_s <= PAL_STEP_MAX_S))
         return PAL_REFUSE(diag, "step_s: %g is outside [1e-4, 0.1]", scene->step_s);
     double up2 = scene->up[0] * scene->up[0] + scene->up[1] * scene->up[1] + scene->up[2] * scene->up[2];
     if (!(fabs(up2 - 1) < 1e-3)) return PAL_REFUSE(diag, "up: length %g, wanted a unit vector", sqrt(up2));
+    const char *fault = pal_anatomical_axes_fault(scene->anatomical_axes);
+    if (fault) return PAL_REFUSE(diag, "anatomical_axes: %s %s", scene->anatomical_axes, fault);
     if (!(fabs(scene->gravity_m_s2) <= 1e4))
         return PAL_REFUSE(diag, "gravity_m_s2: %g is outside [-1e4, 1e4]", scene->gravity_m_s2);
     if (scene->max_substep < 1 || scene->max_substep > 1000000)

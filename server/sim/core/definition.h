@@ -4,7 +4,9 @@
 #ifndef PAL_SIM_CORE_DEFINITION_H
 #define PAL_SIM_CORE_DEFINITION_H
 #include "server/mesh/cells/maccracken_joy.h"
+#include "server/mesh/files/image_file.h"
 #include "server/mesh/volume/prepared.h"
+#include "server/sim/core/anatomical_axes.h"
 #include "server/sim/core/config_entry.h"
 #include "server/sim/core/tools.h"
 #include "server/sim/core/tuning.h"
@@ -66,9 +68,17 @@ typedef struct pal_stroke {
 } pal_stroke;
 enum { PAL_STROKE_MAX = 4096 };
 
+/* what a body may look like (clients/viewer/src/tissue_looks.js draws each); no effect on its mechanics */
+#define PAL_APPEARANCES                                                                                                \
+    "liver|gall_bladder|stomach|intestine|kidney|spleen|pancreas|heart|lung|brain|vessel|bone|fat|muscle|skin|plastic"
+enum { PAL_APPEARANCE_BYTES = 16, PAL_COLOUR_BYTES = 8 };
+
 typedef struct pal_body_def {
     char name[PAL_NAME];
-    const pal_prepared *mesh; /* borrowed                                                        */
+    char appearance[PAL_APPEARANCE_BYTES]; /* a word of PAL_APPEARANCES; "": unknown */
+    char colour[PAL_COLOUR_BYTES];         /* "#rrggbb" in place of the appearance's own; "": its own */
+    const pal_prepared *mesh;              /* borrowed                                                        */
+    const pal_image *image;                /* shown on mesh->surface, which has uv then; borrowed; NULL: none */
     /* model subdivision_fem: control cells, body frame, borrowed; NULL for other models. mesh then has the triangles of
      * the control cells' boundary alone (surface), for size, origin and messages */
     const pal_cells *cells;
@@ -113,6 +123,10 @@ typedef struct pal_tool_def {
     double trocar_m[3]; /* the point that the shaft passes; for clients, the simulation takes any pose */
 } pal_tool_def;
 
+/* s: limits of step_s */
+#define PAL_STEP_MIN_S 1e-4
+#define PAL_STEP_MAX_S 0.1
+
 typedef struct pal_scene {
     char name[PAL_NAME]; /* session name, [a-z0-9_-]                                  */
     char title[128];     /* shown to people: "Liver, abdominal CT"                    */
@@ -123,9 +137,10 @@ typedef struct pal_scene {
      * the most accurate with a step of at most budget_ms, or the cheapest that meets both; 0: none. The world reads
      * neither */
     double max_error_m, budget_ms;
-    double step_s;       /* one step of the world; sub-steps are the solver's own: 1/60 */
-    double up[3];        /* unit, against gravity: (0, 0, 1)                          */
-    double gravity_m_s2; /* 9.81; acts on bodies with the effect `gravity`            */
+    double step_s;                        /* one step of the world; sub-steps are the solver's own: 1/60 */
+    double up[3];                         /* unit, against gravity: (0, 0, 1)                          */
+    char anatomical_axes[PAL_AXES_BYTES]; /* where x, y and z point in the patient, "RAS"; "": not known */
+    double gravity_m_s2;                  /* 9.81; acts on bodies with the effect `gravity`            */
     bool keep_real_time; /* a server gives up accuracy before time (server/net/hub_watch.h); no effect elsewhere */
     int max_substep;     /* budget of sub-steps per step, refused beyond: 2000        */
     int n_body;

@@ -11,6 +11,7 @@ typedef struct pal_shown {
     const float *rest_m; /* scene frame             [n_vertex][3] */
     const int32_t *tri;  /* counter-clockwise, as at load; of an adaptive body the slot table, 0 0 0 in empty slots
                             (pal_frame_part.slot brings its changes) [n_tri][3] */
+    const float *uv;     /* image coordinates of the vertices (pal_surface.uv); NULL: none [n_vertex][2] */
     uint64_t revision;
     const int32_t
         *face; /* control face of each triangle, -1: none (body.shown_face); NULL: no subdivision solid [n_tri] */

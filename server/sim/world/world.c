@@ -129,6 +129,20 @@ static pal_err make_hierarchy(pal_world *w, const pal_levels *levels, pal_shown 
     return PAL_ERR_OK;
 }
 
+/* a midpoint lies in the middle of its edge in the image too */
+static pal_err make_image_places(pal_world *w, const float *coarse, pal_shown *p)
+{
+    float *uv = PAL_NEW(w->arena, float, 2 * (size_t)p->n_vertex);
+    if (!uv) return PAL_ERR_MEMORY;
+    memcpy(uv, coarse, 2 * (size_t)p->n_coarse * sizeof *uv);
+    for (int i = p->n_coarse; i < p->n_vertex; i++) {
+        const int32_t *parent = p->parent + 2 * (size_t)(i - p->n_coarse);
+        for (int c = 0; c < 2; c++) uv[2 * i + c] = 0.5f * (uv[2 * parent[0] + c] + uv[2 * parent[1] + c]);
+    }
+    p->uv = uv;
+    return PAL_ERR_OK;
+}
+
 static pal_err make_part(pal_world *w, int b)
 {
     const pal_body *body = &w->plan.body[b];
@@ -152,7 +166,9 @@ static pal_err make_part(pal_world *w, int b)
     pal_copy3(p->offset_m, body->offset_m);
     if (body->tets) p->n_node = body->tets->n_node, p->n_tet = body->tets->n_tet, p->tet = body->tets->tet;
     if (display->tet) p->n_node = body->n_node, p->n_tet = display->n_tet, p->tet = display->tet;
-    return body->active ? make_hierarchy(w, body->dofs.levels, p) : PAL_ERR_OK;
+    if (display->skin) p->uv = display->surface->uv;
+    PAL_TRY(body->active ? make_hierarchy(w, body->dofs.levels, p) : PAL_ERR_OK);
+    return body->active && display->surface->uv ? make_image_places(w, display->surface->uv, p) : PAL_ERR_OK;
 }
 
 void pal_world_show(pal_world *w, int b)

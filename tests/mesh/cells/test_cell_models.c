@@ -272,7 +272,7 @@ static void boundaries_read_back_closed_with_their_genus(void)
         pal_surface out = {0}, in = {0};
         pal_surface_report report = {.n_tri_read = 0};
         pal_surface_topology topology;
-        const pal_mesh_file_options metres = {1, 0};
+        const pal_mesh_file_options metres = {.unit_m = 1};
         snprintf(path, sizeof path, "test_cell_models_%ld.%s", (long)getpid(), end[k % 3]);
         CHECK_INT(pal_cells_boundary(&c, &out, NULL, NULL), PAL_ERR_OK);
         CHECK_INT(pal_mesh_file_write(path, &out, NULL), PAL_ERR_OK);

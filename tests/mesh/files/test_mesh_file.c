@@ -1,15 +1,17 @@
 /* Surface files: every form the formats allow gives the same tetrahedron or cube, hostile files give one sentence with
  * name and place, and the shared models have the counts that are known of them. */
+#include "server/base/vec3.h"
 #include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/mesh_file.h"
 #include "tests/check.h"
 #include "tests/fixtures/random.h"
+#include "tests/fixtures/shapes.h"
 
 #include <locale.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
-static const pal_mesh_file_options metres = {1, 0};
+static const pal_mesh_file_options metres = {.unit_m = 1};
 
 static pal_err parse(const char *name, const void *bytes, size_t n, pal_surface *s, pal_surface_report *r,
                      pal_diagnostic *diag)
@@ -227,7 +229,7 @@ static void numbers_are_exact_and_independent_of_the_locale(void)
         char text[400];
         snprintf(text, sizeof text, "v %s 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", word[k]);
         pal_surface s = {0};
-        pal_mesh_file_options raw = {1, -1};
+        pal_mesh_file_options raw = {.unit_m = 1, .weld = -1};
         pal_err err =
             pal_mesh_file_parse("n.obj", (const uint8_t *)text, strlen(text), &raw, &s, NULL, NULL, NULL, NULL);
         if (k >= 12) {
@@ -491,6 +493,83 @@ static void hostile_stl_is_refused_with_its_place(void)
     check_refused("nan.stl", nans, sizeof nans);
 }
 
+/* a ball of 2,390 triangles as binary STL, each coordinate of each corner moved by up to jitter, of the diagonal */
+static size_t write_soup(double jitter, uint8_t *bytes, double *volume, double *diagonal)
+{
+    pal_surface s = shape_ball(50, 239, 6, 0.1);
+    uint64_t state = 5;
+    double low[3], high[3];
+    pal_surface_box(&s, low, high);
+    *volume = pal_surface_volume(&s);
+    *diagonal = pal_dist3(low, high);
+    shape_unweld(&s);
+    uint32_t n = (uint32_t)s.n_tri;
+    memset(bytes, 0, 84 + 50 * (size_t)n);
+    memcpy(bytes + 80, &n, 4);
+    for (size_t k = 0; k < 9 * (size_t)n; k++) {
+        float x = (float)(s.x[k] + jitter * *diagonal * random_signed(&state));
+        memcpy(bytes + 84 + 50 * (k / 9) + 12 + 4 * (k % 9), &x, 4);
+    }
+    pal_surface_free(&s);
+    return 84 + 50 * (size_t)n;
+}
+
+static void a_soup_whose_corners_nearly_meet_is_closed_and_one_with_gaps_refused(void)
+{
+    enum { N = 2390 };
+    uint8_t *bytes = malloc(84 + 50 * N);
+    REQUIRE(bytes);
+    static const double jitter[] = {0, 1e-7, 2e-6, 1e-5, 1e-4};
+    for (size_t k = 0; k < sizeof jitter / sizeof *jitter; k++) {
+        double volume, diagonal, unit;
+        pal_surface s = {0};
+        pal_surface_report r = {0};
+        pal_surface_topology topology;
+        pal_diagnostic diag = {""};
+        const pal_mesh_file_options mm = {.unit_m = 1e-3, .weld = PAL_MESH_WELD};
+        size_t n = write_soup(jitter[k], bytes, &volume, &diagonal);
+        REQUIRE(n == 84 + 50 * N);
+        pal_err err = pal_mesh_file_parse("soup.stl", bytes, n, &mm, &s, &r, &unit, NULL, &diag);
+        /* two corners are moved towards each other along each axis at the largest */
+        const double max_gap = 2 * sqrt(3) * (jitter[k] + 1e-7) * diagonal;
+        if (max_gap > PAL_MESH_WELD * diagonal) {
+            double gap = 0, closed = 0;
+            CHECK_INT(err, PAL_ERR_REFUSED);
+            CHECK_INT(sscanf(diag.text,
+                             "soup.stl: byte 84: corners of neighbouring triangles miss each other by up to %lf in the "
+                             "file's unit, and gaps of at most %lf are closed: join",
+                             &gap, &closed),
+                      2);
+            CHECK(gap <= 1.01 * max_gap && gap > 0.5 * max_gap);
+            CHECK_NEAR(closed, PAL_MESH_WELD * diagonal, 0.01 * closed);
+            continue;
+        }
+        REQUIRE(!err && !pal_surface_check(&s, &topology));
+        CHECK(topology.closed && topology.oriented && topology.manifold);
+        CHECK_INT(s.n_tri, N);
+        CHECK_INT(s.n_vertex, N / 2 + 2);
+        CHECK_INT(r.n_welded, 3 * N - s.n_vertex);
+        CHECK(r.max_weld_m <= 1e-3 * max_gap && r.max_weld_m >= 0.5e-3 * sqrt(3) * jitter[k] * diagonal);
+        CHECK_NEAR(1e9 * pal_surface_volume(&s) / volume, 1, 1e-5);
+        pal_surface_free(&s);
+    }
+    free(bytes);
+}
+
+static void an_open_sheet_and_a_single_triangle_are_no_soup(void)
+{
+    static const char *const text[] = {"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+                                       "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n"};
+    const pal_mesh_file_options welded = {.unit_m = 1, .weld = PAL_MESH_WELD};
+    for (int k = 0; k < 2; k++) {
+        pal_surface s = {0};
+        const uint8_t *bytes = (const uint8_t *)text[k];
+        CHECK(!pal_mesh_file_parse("open.obj", bytes, strlen(text[k]), &welded, &s, NULL, NULL, NULL, NULL));
+        CHECK_INT(s.n_tri, k + 1);
+        pal_surface_free(&s);
+    }
+}
+
 static void missing_files_folders_and_long_names_are_refused(void)
 {
     pal_surface s = {0};
@@ -659,6 +738,8 @@ int main(void)
     RUN(hostile_off_is_refused_with_its_line);
     RUN(hostile_ply_is_refused_with_its_place);
     RUN(hostile_stl_is_refused_with_its_place);
+    RUN(a_soup_whose_corners_nearly_meet_is_closed_and_one_with_gaps_refused);
+    RUN(an_open_sheet_and_a_single_triangle_are_no_soup);
     RUN(missing_files_folders_and_long_names_are_refused);
     RUN(ply_and_tetgen_files_come_back_as_they_were);
     RUN(shared_models_have_their_known_counts_and_volumes);

@@ -1,6 +1,8 @@
 /* Surfaces: measures against analytic answers, cleaning counts, topology of known faults. */
+#include "server/base/vec3.h"
 #include "server/mesh/geometry/surface.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 
 /* unit cube, 12 triangles, outward */
 static const double cube_x[24] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1};
@@ -188,6 +190,39 @@ static void welding_joins_triangle_soup_within_the_tolerance_only(void)
     }
 }
 
+/* copies of a vertex join wherever the cells of the search end, and vertices of ten times the tolerance never do */
+static void welding_is_the_same_at_every_place_and_keeps_detail(void)
+{
+    enum { SIDE = 40 };
+    const double eps = 1e-5, edge = 10 * eps;
+    pal_surface s = {.x = malloc(sizeof(double) * 18 * SIDE * SIDE), .tri = malloc(sizeof(int32_t) * 6 * SIDE * SIDE)};
+    uint64_t state = 3;
+    REQUIRE(s.x && s.tri);
+    /* a sheet whose edges are ten times the tolerance, each corner of each triangle moved by up to 0.28 of it along
+     * each axis, so that two copies of a vertex are at most 0.97 of it apart */
+    for (int j = 0; j + 1 < SIDE; j++)
+        for (int i = 0; i + 1 < SIDE; i++)
+            for (int k = 0; k < 6; k++) {
+                static const int at[6][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 0}, {1, 1}, {0, 1}};
+                double x[3] = {edge * (i + at[k][0]), edge * (j + at[k][1]), 0};
+                for (int a = 0; a < 3; a++) x[a] += 0.28 * eps * random_signed(&state);
+                s.tri[3 * s.n_tri + k % 3] = s.n_vertex;
+                add_vertex(&s, x[0], x[1], x[2]);
+                if (k % 3 == 2) s.n_tri++;
+            }
+    double low[3], high[3];
+    pal_surface_box(&s, low, high);
+    pal_surface_report report = {0};
+    pal_surface_topology topology;
+    REQUIRE(!pal_surface_clean(&s, eps / pal_dist3(low, high), &report, NULL));
+    REQUIRE(!pal_surface_check(&s, &topology));
+    CHECK_INT(s.n_tri, 2 * (SIDE - 1) * (SIDE - 1));
+    CHECK_INT(s.n_vertex, SIDE * SIDE);
+    CHECK_INT(topology.n_open_edge, 4 * (SIDE - 1));
+    CHECK(topology.manifold && report.max_weld_m < 0.97 * eps && report.max_weld_m > 0.5 * eps);
+    pal_surface_free(&s);
+}
+
 static void a_fin_vanishes_but_a_body_drawn_twice_stays(void)
 {
     /* two triangles back to back between a corner edge of the cube and a point outside */
@@ -302,6 +337,7 @@ int main(void)
     RUN(cleaning_counts_each_kind_of_fault);
     RUN(cleaning_recentres_and_keeps_far_positions);
     RUN(welding_joins_triangle_soup_within_the_tolerance_only);
+    RUN(welding_is_the_same_at_every_place_and_keeps_detail);
     RUN(a_fin_vanishes_but_a_body_drawn_twice_stays);
     RUN(flat_triangles_are_mended_without_a_slit);
     RUN(flat_triangles_at_a_crowded_vertex_are_dropped);

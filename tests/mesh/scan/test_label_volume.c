@@ -280,6 +280,7 @@ static void axes_turn_mirror_and_shift_the_body(void)
     REQUIRE(parse("s.nii", b.at, b.n, &v, NULL) == PAL_ERR_OK);
     const double at_m[3] = {0.5 + 2e-3 * middle[2], -0.2 - 1e-3 * middle[0], 1.25e-3 * middle[1]};
     check_surface(&v, at_m, 1500);
+    CHECK_TEXT(v.axes, "RAS");
     pal_label_volume_free(&v);
     free(b.at);
 
@@ -291,8 +292,21 @@ static void axes_turn_mirror_and_shift_the_body(void)
     REQUIRE(parse("q.nii", b.at, b.n, &v, NULL) == PAL_ERR_OK);
     const double turned[3] = {0.1 - 1e-3 * middle[0], 0.05 - 1.25e-3 * middle[1], -0.02 - 2e-3 * middle[2]};
     check_surface(&v, turned, 1500);
+    CHECK_TEXT(v.axes, "RAS");
     pal_label_volume_free(&v);
     free(b.at);
+}
+
+static void a_file_without_directions_has_no_axes(void)
+{
+    bytes b[2] = {make_nifti(2, false, 0, 0), make_inr("unsigned fixed", 2, false)};
+    for (int k = 0; k < 2; k++) {
+        pal_label_volume v = {0};
+        REQUIRE(parse(k ? "a.inr" : "a.nii", b[k].at, b[k].n, &v, NULL) == PAL_ERR_OK);
+        CHECK_TEXT(v.axes, "");
+        pal_label_volume_free(&v);
+        free(b[k].at);
+    }
 }
 
 static int n_hostile;
@@ -541,6 +555,7 @@ int main(void)
     RUN(lists_labels_by_size);
     RUN(ball_of_coarse_slices_is_smooth_closed_and_has_its_volume);
     RUN(axes_turn_mirror_and_shift_the_body);
+    RUN(a_file_without_directions_has_no_axes);
     RUN(hostile_nifti_is_refused_with_its_byte);
     RUN(hostile_inrimage_is_refused_with_its_line);
     RUN(a_gzip_bomb_costs_no_more_than_its_header_asks_for);
