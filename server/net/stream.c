@@ -8,6 +8,7 @@
 #include "server/base/vec3.h"
 #include "server/net/transport/plain_text.h"
 #include "server/net/tuning.h"
+#include "server/session/control_cells.h"
 #include "server/session/tuning.h"
 
 #include <math.h>
@@ -23,14 +24,33 @@ static pal_err refuse(pal_diagnostic *diag, int refusal, const char *part, const
                               part, what, pal_refusal_text(refusal));
 }
 
-static pal_err name_image(pal_stream_part *part, const pal_image *image)
+/* makes a file of a part, which is named after its content; path: PAL_WIRE_NAME_BYTES */
+static pal_err make_file(const void *bytes, size_t n_byte, char *path, pal_packet **out)
 {
     char hash[PAL_ASSET_HASH_CHARS];
-    part->image = pal_packet_create(image->bytes, image->n_byte, false);
-    if (!part->image) return PAL_ERR_MEMORY;
-    pal_asset_hash(image->bytes, image->n_byte, hash);
-    snprintf(part->info.image, sizeof part->info.image, "/asset/%s", hash);
-    return PAL_ERR_OK;
+    *out = pal_packet_create(bytes, n_byte, false);
+    pal_asset_hash(bytes, n_byte, hash);
+    snprintf(path, PAL_WIRE_NAME_BYTES, "/asset/%s", hash);
+    return *out ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+/* what a click on a sculptable part means */
+static pal_err open_control_cells(pal_stream *s, int index, const pal_shown *shown)
+{
+    pal_stream_part *part = &s->part[index];
+    double origin_m[3];
+    part->info.is_sculptable = shown->face != NULL;
+    if (!shown->face) return PAL_ERR_OK;
+    pal_sub3(origin_m, s->scene->body[index].mesh->surface.origin_m, s->scene->body[0].mesh->surface.origin_m);
+    char *text = pal_control_cells_text(s->scene->body[index].cells, origin_m, shown);
+    pal_err err = text ? make_file(text, strlen(text), part->info.control_cells, &part->control_cells) : PAL_ERR_MEMORY;
+    free(text);
+    return err;
+}
+
+static pal_err name_image(pal_stream_part *part, const pal_image *image)
+{
+    return make_file(image->bytes, image->n_byte, part->info.image, &part->image);
 }
 
 /* builds the asset and encoders of one part */
@@ -40,7 +60,6 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
     pal_frame_order *order = NULL;
     uint8_t *bytes = NULL;
     size_t n_byte = 0;
-    char hash[PAL_ASSET_HASH_CHARS];
     pal_err err = PAL_ERR_OK;
     const uint32_t *tri = (const uint32_t *)shown->tri; /* indices are nonnegative */
     const pal_image *image = shown->uv ? s->scene->body[index].image : NULL;
@@ -59,17 +78,15 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
         refusal = pal_frame_encoder_create(shown->rest_m, order, &s->encoder[index][t]);
         if (refusal) err = refuse(diag, refusal, shown->name, "no encoder");
     }
-    if (!err && !(part->asset = pal_packet_create(bytes, n_byte, false))) err = PAL_ERR_MEMORY;
+    if (!err) err = make_file(bytes, n_byte, part->info.asset, &part->asset);
+    if (!err) err = open_control_cells(s, index, shown);
     if (!err) {
-        pal_asset_hash(bytes, n_byte, hash);
-        snprintf(part->info.asset, sizeof part->info.asset, "/asset/%s", hash);
         if (image) err = name_image(part, image);
         pal_plain_text(part->info.name, sizeof part->info.name, shown->name);
         part->info.epoch = 1;
         part->info.n_vertex = (uint32_t)shown->n_vertex;
         part->info.n_triangle = (uint32_t)shown->n_tri;
         part->info.is_adaptive = shown->is_adaptive;
-        part->info.is_sculptable = shown->face != NULL;
         pal_plain_text(part->info.appearance, sizeof part->info.appearance, s->scene->body[index].appearance);
         pal_plain_text(part->info.colour, sizeof part->info.colour, s->scene->body[index].colour);
         if (!err && shown->is_adaptive)
