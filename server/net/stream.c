@@ -157,6 +157,7 @@ void pal_stream_close(pal_stream *stream)
     for (int p = 0; p < stream->n_part; p++) {
         pal_packet_drop(stream->part[p].asset);
         pal_packet_drop(stream->part[p].image);
+        pal_packet_drop(stream->part[p].control_cells);
         pal_triangle_slots_free(stream->part[p].slots);
         for (int k = 0; k < PAL_FIELD_COUNT; k++) pal_packet_drop(stream->part[p].field[k]);
         for (int t = 0; t < PAL_STREAM_TIER_COUNT; t++) {

@@ -59,6 +59,45 @@ const facePixel = (page, axis) =>
             }
         return best;
     }, axis);
+/** what the page shows that a click at a pixel would pick, once it has looked there */
+const pickedAt = async (page, { x, y }) => {
+    await page.mouse.move(x, y);
+    return until(() =>
+        page.evaluate(
+            (at) => {
+                const { highlight, input, stage } = window.palpate;
+                const hit = input.pick(stage.ray(at.x, at.y));
+                return hit && highlight.hit && hit.point.distanceTo(highlight.hit.point) < 1e-4 && highlight.picked;
+            },
+            { x, y },
+        ),
+    );
+};
+/** the last answer, if it is of this verb */
+const answered = (page, verb) =>
+    until(
+        () => page.evaluate(() => (window.palpate.sculpt.isBusy() ? null : window.palpate.sculpt.answered)),
+        (a) => a?.verb === verb,
+    );
+const samePick = (a, b) => ["face", "cell", "edge", "vertex"].every((key) => a[key] === b[key]);
+/** radius of the shown ring in pixels, and that of the brush */
+const ringRadius = (page) =>
+    page.evaluate(() => {
+        const { highlight, sculpt, stage } = window.palpate;
+        const { geometry } = highlight.marks.lines;
+        const x = geometry.getAttribute("instanceStart").data.array;
+        const centre = highlight.hit.point;
+        const at = stage.project(centre);
+        let shown = 0;
+        for (let i = 0; i < 6 * geometry.instanceCount; i += 3) {
+            const p = stage.project(centre.clone().fromArray(x, i));
+            shown = Math.max(shown, Math.hypot(p.x - at.x, p.y - at.y));
+        }
+        // a metre is larger where the surface is nearer than the middle of the view
+        const away = stage.camera.position.clone().sub(stage.target).normalize();
+        const depth = stage.camera.position.clone().sub(centre).dot(away);
+        return { shown, brush: (sculpt.settings().radius_m * stage.pixelsPerMetre() * stage.distance) / depth };
+    });
 const tool = (page, name) => page.click(`#sculpt-tools button[data-name=${name}]`);
 const drawn = async (page) =>
     until(
@@ -117,8 +156,14 @@ await run(async () => {
         look();
     });
     const top = await until(() => facePixel(ada, 2));
+    const pick = await pickedAt(ada, top);
+    check("the face under the mouse is filled", await ada.evaluate(() => window.palpate.highlight.marks.fill.visible));
+    await drawn(ada);
+    await ada.screenshot({ path: join(pictures, "sculpt_highlight.png") });
     await ada.mouse.click(top.x, top.y);
     const grown = await after(ada, begin.epoch);
+    const changed = (await answered(ada, "extrude")).args;
+    check("the click changes what was shown under the mouse", samePick(pick, changed), JSON.stringify([pick, changed]));
     check(
         "a click on a face extrudes a cell",
         grown.vertices > begin.vertices && grown.triangles > begin.triangles,
@@ -141,6 +186,32 @@ await run(async () => {
     check("Ctrl+Shift+Z repeats it", same(redone, grown), summary(redone));
     check("every picture shows the body", (await ada.evaluate(() => window.blank)) === 0);
 
+    // page and server pick the same, all over the surface
+    await tool(ada, "probe");
+    const places = await ada.evaluate(() => {
+        const { stage, input } = window.palpate;
+        const out = [];
+        for (let y = 0.1; y < 0.9; y += 0.11)
+            for (let x = 0.3; x < 0.9; x += 0.07) {
+                const at = { x: x * innerWidth, y: y * innerHeight };
+                if (document.elementFromPoint(at.x, at.y)?.id === "view" && input.pick(stage.ray(at.x, at.y)))
+                    out.push(at);
+            }
+        return out.slice(0, 12);
+    });
+    let agreed = 0;
+    for (const place of places) {
+        const there = await pickedAt(ada, place);
+        await ada.evaluate(() => (window.palpate.sculpt.answered = null));
+        await ada.mouse.click(place.x, place.y);
+        if (samePick(there, (await answered(ada, "probe")).args)) agreed++;
+    }
+    check(
+        "page and server pick the same everywhere",
+        agreed === places.length && agreed > 5,
+        `${agreed} of ${places.length}`,
+    );
+
     const spot = await until(() => facePixel(ada, 2));
     const probe = async () => {
         await tool(ada, "probe");
@@ -156,6 +227,15 @@ await run(async () => {
     check("the probe displays the material", soft === "5 kPa, 1000 kg/m³", soft);
     await tool(ada, "paint");
     await ada.click("#sculpt-paints button[data-name=stiffer]");
+    await pickedAt(ada, spot);
+    await drawn(ada);
+    const ring = await ringRadius(ada);
+    check(
+        "the ring of the brush has its radius",
+        Math.abs(ring.shown / ring.brush - 1) < 0.05,
+        `${ring.shown.toFixed(1)} of ${ring.brush.toFixed(1)} pixels`,
+    );
+    await ada.screenshot({ path: join(pictures, "sculpt_ring.png") });
     await ada.mouse.click(spot.x, spot.y);
     const painted = await after(ada, redone.epoch);
     check("painting is answered", /^Paint: 77 cells/.test(painted.message), painted.message);

@@ -168,10 +168,15 @@ export class BodyMesh {
         if (this.lines && !on) this.lines.visible = false;
     }
 
+    /** corners of the triangles in use */
+    triangles() {
+        const index = /** @type {THREE.BufferAttribute} */ (this.geometry.index);
+        return /** @type {Uint32Array} */ (index.array).subarray(0, this.nCorner);
+    }
+
     /** the surface as drawn, for a file @returns {import("./exporters.js").Surface} */
     surface() {
-        const index = /** @type {THREE.BufferAttribute} */ (this.geometry.index);
-        return { positions: this.position.array, triangles: index.array.subarray(0, this.nCorner) };
+        return { positions: this.position.array, triangles: this.triangles() };
     }
 
     /** draws the edges of the triangles @param {boolean} on */
@@ -208,8 +213,7 @@ export class BodyMesh {
 
     /** @param {THREE.Ray} ray @returns {import("./picking.js").Hit | null} */
     pick(ray) {
-        const index = /** @type {THREE.BufferAttribute} */ (this.geometry.index);
-        return pickTriangle(ray, this.position.array, index.array, this.nCorner);
+        return pickTriangle(ray, this.position.array, this.triangles(), this.nCorner);
     }
 
     dispose() {

@@ -104,12 +104,12 @@ export class BodySet {
         for (const body of this.retired.splice(0)) body.dispose();
     }
 
-    /** nearest hit of a ray @param {import("./three.js").Ray} ray @returns {import("./picking.js").Hit | null} */
+    /** nearest hit of a ray @param {import("./three.js").Ray} ray @returns {(import("./picking.js").Hit & {part: number}) | null} */
     pick(ray) {
         let nearest = null;
-        for (const body of this.state.bodies.values()) {
+        for (const [part, body] of this.state.bodies) {
             const hit = body.pick(ray);
-            if (hit && (!nearest || hit.distance < nearest.distance)) nearest = hit;
+            if (hit && (!nearest || hit.distance < nearest.distance)) nearest = { ...hit, part };
         }
         return nearest;
     }

@@ -23,6 +23,7 @@ import { PlaybackBar } from "./playback_bar.js";
 import { Plots } from "./plots.js";
 import { PoseSender } from "./pose_sender.js";
 import { showScale } from "./scale_bar.js";
+import { SculptHighlight } from "./sculpt_highlight.js";
 import { SculptPanel } from "./sculpt_panel.js";
 import { Stage } from "./stage.js";
 import { store, stored } from "./storage.js";
@@ -78,7 +79,11 @@ const input = new ToolInput(
     },
     (tip) => marks.hand(state.ownTool, tip),
 );
-input.onClick = (/** @type {number[]} */ position) => sculpt.click(position);
+const highlight = new SculptHighlight(stage, state, sculpt);
+sculpt.onChange = () => highlight.refresh();
+sculpt.nameOf = (/** @type {number} */ part) => state.parts[part]?.name ?? "";
+input.onClick = (/** @type {import("./tool_input.js").Hit} */ hit) => sculpt.click(hit);
+input.onHover = (/** @type {import("./tool_input.js").Hit | null} */ hit) => highlight.hover(hit);
 input.onFirstDrag = () => htmlById("hint").classList.add("gone");
 const views = new ViewModes(
     stage,
@@ -93,9 +98,9 @@ viewMenu.offerHeadset(() => {
     return { state, stage, poses: ownPoses, second, picture };
 });
 const showFigures = () => messages.showFigures();
-const tools = { accuracy, plots, sculpt, viewMenu };
+const tools = { accuracy, plots, sculpt, highlight, viewMenu };
 const controls = new Controls({ state, stage, layout, input, fields, ...tools, send, showFigures });
-const panels = { panel, members, accuracy, plots, sculpt, playback, others, controls };
+const panels = { panel, members, accuracy, plots, sculpt, highlight, playback, others, controls };
 const messages = new Messages({ state, stage, layout, bodies, fields, input, marks, send, ...panels });
 worker.onmessage = (/** @type {MessageEvent<import("./link.js").PageMessage>} */ { data }) => messages.take(data);
 
@@ -159,6 +164,7 @@ function picture() {
                 MARK_RADIUS * stage.size,
                 now,
             );
+            highlight.update();
             stage.draw();
             bodies.disposeRetired();
             marks.placeLabels();
@@ -203,7 +209,7 @@ inputById("name").onchange = () => {
     connect();
 };
 // read-only access for tests and for the console
-const shown = { state, stage, input, marks, accuracy, plots, capture, cue, views };
+const shown = { state, stage, input, marks, accuracy, plots, capture, cue, views, sculpt, highlight };
 Object.defineProperty(window, "palpate", { value: shown });
 connect();
 draw();

@@ -4,6 +4,7 @@ import { buttonById, chooseByArrows, htmlById, inputById, markRadio, selectById 
 import { answerText, boxAround, commandOf, cutCommand, FORCES, PAINTS, TOOLS } from "./sculpt_commands.js";
 
 /** @typedef {import("./sculpt_commands.js").Command} Command */
+/** @typedef {import("./tool_input.js").Hit} Hit */
 
 const WAIT_MS = 20000; // after this an answer counts as lost
 const SLIDER_STEPS = 200;
@@ -12,7 +13,7 @@ const STIFFNESS_N_M = 60; // of the spring that pulls a curve
 export class SculptPanel {
     /**
      * @param {Document} page
-     * @param {(command: Command) => void} send
+     * @param {(command: Command & {target?: string}) => void} send
      * @param {(format: string) => void} save
      */
     constructor(page, send, save) {
@@ -20,8 +21,16 @@ export class SculptPanel {
         this.send = send;
         this.offered = false;
         this.tool = "extrude";
-        /** @type {number[][]} clicked so far, m */
-        this.points = [];
+        /** @type {Hit[]} clicked so far */
+        this.hits = [];
+        /** called when the tool, its settings or the clicked places have changed */
+        this.onChange = () => {};
+        /** @type {(part: number) => string} name of a part, "" if it cannot be sculpted */
+        this.nameOf = () => "";
+        /** part that was clicked last, "": the first that can be sculpted */
+        this.target = "";
+        /** @type {import("./control_table.js").Answer | null} newest */
+        this.answered = null;
         /** @type {Command | null} not answered yet */
         this.pending = null;
         this.sentAt = 0;
@@ -37,6 +46,7 @@ export class SculptPanel {
         this.tools = this.fill("sculpt-tools", TOOLS, (name) => this.choose(name));
         this.paints = this.fill("sculpt-paints", PAINTS, (name) => this.mark(this.paints, name));
         this.mark(this.paints, "stiffer");
+        selectById("sculpt-entity", page).onchange = () => this.onChange();
         for (const verb of ["set_rest_shape", "undo", "redo"])
             this.button(verb).onclick = () => this.submit({ verb, args: {} });
         for (const format of ["obj", "stl", "ply"]) this.button(format).onclick = () => save(format);
@@ -87,15 +97,16 @@ export class SculptPanel {
     /** @param {string} tool */
     choose(tool) {
         this.tool = tool;
-        this.points = [];
+        this.hits = [];
         this.mark(this.tools, tool);
         for (const row of this.page.querySelectorAll("#sculpt [data-for]"))
             if (row instanceof HTMLElement) row.hidden = !row.dataset.for?.split(" ").includes(tool);
         this.hint();
+        this.onChange();
     }
 
     hint() {
-        this.message.textContent = TOOLS[this.tool].hints[this.points.length];
+        this.message.textContent = TOOLS[this.tool].hints[this.hits.length];
     }
 
     /** after `hello`, with the box of the scene @param {number[]} low @param {number[]} high */
@@ -103,6 +114,7 @@ export class SculptPanel {
         this.box = { low, high };
         this.size = Math.hypot(...low.map((v, i) => high[i] - v));
         this.pending = this.nextCut = null;
+        this.target = "";
         this.setForce(null);
         this.showBusy();
         this.showValues();
@@ -142,21 +154,23 @@ export class SculptPanel {
         show("sharpness", String(sharpness));
         show("pressure", Math.round(pressure_Pa) + " Pa");
         show("lift", mm(lift_m));
+        this.onChange();
     }
 
-    /** @param {number[]} point of the surface, m */
-    click(point) {
+    /** @param {Hit} hit of the surface */
+    click(hit) {
         if (this.isBusy()) return;
-        this.points.push(point);
-        const command = commandOf(this.tool, this.settings(), this.points);
-        if (!command) {
-            this.hint();
-            return;
+        this.target = this.nameOf(hit.part);
+        this.hits.push(hit);
+        const points = this.hits.map(({ point }) => point.toArray());
+        const command = commandOf(this.tool, this.settings(), points);
+        if (!command) this.hint();
+        else {
+            if (FORCES.includes(this.tool)) this.setForce({ tool: this.tool, points, settings: this.settings() });
+            this.hits = [];
+            this.submit(command);
         }
-        if (FORCES.includes(this.tool))
-            this.setForce({ tool: this.tool, points: this.points, settings: this.settings() });
-        this.points = [];
-        this.submit(command);
+        this.onChange();
     }
 
     /** @param {SculptPanel["force"]} force that acts from now on, null: none */
@@ -194,7 +208,7 @@ export class SculptPanel {
         if (command.verb === "release") this.setForce(null);
         this.pending = command;
         this.sentAt = performance.now();
-        this.send(command);
+        this.send({ ...command, target: this.target });
         this.showBusy();
     }
 
@@ -208,13 +222,14 @@ export class SculptPanel {
 
     /** after `topology`, caused by any member: there may be something to undo, and clicked points mean other faces */
     changed() {
-        this.points = [];
+        this.hits = [];
         this.setForce(null);
         this.button("undo").disabled = this.button("redo").disabled = false;
     }
 
     /** @param {import("./control_table.js").Answer} answer */
     answer(answer) {
+        this.answered = answer;
         this.finish(answerText(answer));
         if (answer.args?.can_undo === undefined) return;
         this.button("undo").disabled = answer.args.can_undo === 0;
