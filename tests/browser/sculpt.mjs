@@ -98,6 +98,30 @@ const ringRadius = (page) =>
         const depth = stage.camera.position.clone().sub(centre).dot(away);
         return { shown, brush: (sculpt.settings().radius_m * stage.pixelsPerMetre() * stage.distance) / depth };
     });
+/** largest angle between a triangle of the cut and the normals of its corners (102 degrees without creases); null: the control cells are not there yet */
+const cutTilt = (page) =>
+    page.evaluate(() => {
+        const { highlight, state } = window.palpate;
+        const cells = highlight.cellsOf(0);
+        if (!cells) return null;
+        const body = state.bodies.get(0);
+        const index = body.geometry.index.array;
+        const at = (array, v) => highlight.stage.target.clone().fromArray(array, 3 * v);
+        let n = 0;
+        let tilt = 0;
+        cells.faceOf.forEach((face, t) => {
+            if (face >= 0) return;
+            n++;
+            const [a, b, c] = index.subarray(3 * t, 3 * t + 3);
+            const x = body.position.array;
+            const normal = at(x, b)
+                .sub(at(x, a))
+                .cross(at(x, c).sub(at(x, a)));
+            for (const v of [a, b, c])
+                tilt = Math.max(tilt, (normal.angleTo(at(body.normal.array, v)) * 180) / Math.PI);
+        });
+        return { n, tilt };
+    });
 const tool = (page, name) => page.click(`#sculpt-tools button[data-name=${name}]`);
 const drawn = async (page) =>
     until(
@@ -277,6 +301,12 @@ await run(async () => {
     await ada.selectOption("#sculpt-axis", "x");
     const cut = await after(ada, painted.epoch);
     check("a cut hides a part", cut.triangles < painted.triangles, summary(cut));
+    const flat = await until(() => cutTilt(ada));
+    check(
+        "no normal on the cut is tilted by what lies beyond its edge",
+        flat.tilt < 45,
+        `${flat.tilt.toFixed(1)} degrees, ${flat.n} triangles`,
+    );
     await drawn(ada);
     await ada.screenshot({ path: join(pictures, "sculpt_cut.png") });
     const [file] = await Promise.all([ada.waitForEvent("download"), ada.click("#sculpt-ply")]);

@@ -54,6 +54,9 @@ export class AppState {
     }
 
     countVertices() {
-        this.figures.vertices = [...this.bodies.values()].reduce((n, body) => n + body.nVisible(), 0);
+        this.figures.vertices = [...this.bodies.values()].reduce(
+            (n, body) => n + body.nVisible() - body.copies.length,
+            0,
+        );
     }
 }

@@ -1,5 +1,6 @@
 // One shown part: the geometry of decoded frames, the triangles of a part that adapts, its edges. Only vertices of the
 // triangles shown have meaningful positions.
+import { withoutCopies } from "./creases.js";
 import { FieldColours } from "./field_colours.js";
 import { vertexNormals } from "./normals.js";
 import { pickTriangle } from "./picking.js";
@@ -44,11 +45,13 @@ export class BodyMesh {
      * @param {Float32Array} rest [n][3] @param {Uint32Array} triangles [m][3]
      * @param {Uint32Array | null} visible the vertices in the triangles, null: all
      * @param {import("./tissue_looks.js").Look} look
+     * @param {Uint32Array} copies vertices of which the last ones are copies, at creases
      */
-    constructor(scene, rest, triangles, visible, look) {
+    constructor(scene, rest, triangles, visible, look, copies) {
         this.scene = scene;
         this.rest = rest;
         this.visible = visible;
+        this.copies = copies;
         this.epoch = 0; // of its asset
         this.shown = false; // a frame has been taken: there are normals, without which it is black
         this.wanted = true;
@@ -68,7 +71,7 @@ export class BodyMesh {
             this.geometry.setAttribute("restNormal", this.restNormal);
             this.updateRestNormals(triangles);
         }
-        if (isClosed(rest, triangles)) this.mesh.material.side = THREE.FrontSide;
+        if (isClosed(rest, this.triangles())) this.mesh.material.side = THREE.FrontSide;
         this.mesh.frustumCulled = false;
         this.mesh.visible = false;
         // the surface lies slightly behind its lines
@@ -168,10 +171,11 @@ export class BodyMesh {
         if (this.lines && !on) this.lines.visible = false;
     }
 
-    /** corners of the triangles in use */
+    /** corners of the triangles in use, of the vertices without copies: those of a closed surface are joined */
     triangles() {
         const index = /** @type {THREE.BufferAttribute} */ (this.geometry.index);
-        return /** @type {Uint32Array} */ (index.array).subarray(0, this.nCorner);
+        const drawn = /** @type {Uint32Array} */ (index.array).subarray(0, this.nCorner);
+        return withoutCopies(drawn, this.copies, this.rest.length / 3);
     }
 
     /** the surface as drawn, for a file @returns {import("./exporters.js").Surface} */

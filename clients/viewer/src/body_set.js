@@ -41,11 +41,11 @@ export class BodySet {
     }
 
     /** @param {Extract<import("./link.js").PageMessage, {type: "part"}>} message */
-    takePart({ part, epoch, rest, uv, triangles, visible }) {
+    takePart({ part, epoch, rest, uv, copies, triangles, visible }) {
         this.pending.get(part)?.dispose();
         this.frames.delete(part); // of the older topology
         const { appearance, colour, image } = this.state.parts[part] ?? {};
-        const body = new BodyMesh(this.stage.scene, rest, triangles, visible, lookOf(appearance, colour));
+        const body = new BodyMesh(this.stage.scene, rest, triangles, visible, lookOf(appearance, colour), copies);
         if (uv && image) showImage(body, uv, image, this.stage);
         const waits = this.state.bodies.has(part);
         body.epoch = epoch;
