@@ -1,9 +1,12 @@
 // The panel of sculpting: the tool of a click and its settings, forces that follow their slider until they are released,
 // undo, the cut, files. One command is pending at a time.
 import { buttonById, chooseByArrows, htmlById, inputById, markRadio, selectById } from "./dom.js";
-import { answerText, boxAround, commandOf, cutCommand, FORCES, PAINTS, TOOLS } from "./sculpt_commands.js";
+import { answerText, boxAround, commandOf, cutCommand, FORCES, hintOf, PAINTS, TOOLS } from "./sculpt_commands.js";
+import { refusalText } from "./sculpt_refusals.js";
+import { text } from "./text.js";
 
 /** @typedef {import("./sculpt_commands.js").Command} Command */
+/** @typedef {import("./text.js").TextKey} TextKey */
 /** @typedef {import("./tool_input.js").Hit} Hit */
 
 const WAIT_MS = 20000; // after this an answer counts as lost
@@ -43,8 +46,11 @@ export class SculptPanel {
         this.force = null;
         this.forceChanged = false; // by its slider, since it was sent
         this.message = htmlById("sculpt-message", page);
-        this.tools = this.fill("sculpt-tools", TOOLS, (name) => this.choose(name));
-        this.paints = this.fill("sculpt-paints", PAINTS, (name) => this.mark(this.paints, name));
+        this.tools = this.fill("tool", Object.keys(TOOLS), (name) => this.choose(name));
+        this.paints = this.fill("paint", Object.keys(PAINTS), (name) => {
+            this.mark(this.paints, name);
+            this.onChange();
+        });
         this.mark(this.paints, "stiffer");
         selectById("sculpt-entity", page).onchange = () => this.onChange();
         for (const verb of ["set_rest_shape", "undo", "redo"])
@@ -70,17 +76,21 @@ export class SculptPanel {
 
     /**
      * Creates the buttons of a radio group.
-     * @param {string} id @param {Record<string, {title: string}>} choices @param {(name: string) => void} onChoice
+     * @param {"tool" | "paint"} kind @param {string[]} names @param {(name: string) => void} onChoice
      * @returns {Map<string, HTMLButtonElement>}
      */
-    fill(id, choices, onChoice) {
-        const group = htmlById(id, this.page);
+    fill(kind, names, onChoice) {
+        const group = htmlById(`sculpt-${kind}s`, this.page);
         const buttons = new Map();
-        for (const [name, { title }] of Object.entries(choices)) {
+        for (const name of names) {
             const button = this.page.createElement("button");
-            button.textContent = title;
+            button.textContent = text(/** @type {TextKey} */ (`sculpt.${kind}.${name}`));
+            const key = TOOLS[name]?.key ?? "";
+            button.title = text(/** @type {TextKey} */ (`sculpt.${kind}.tip.${name}`), { key });
+            button.ariaDescription = button.title;
             button.dataset.name = name;
             button.setAttribute("role", "radio");
+            if (key) button.ariaKeyShortcuts = key;
             button.onclick = () => onChoice(name);
             group.append(button);
             buttons.set(name, button);
@@ -106,7 +116,7 @@ export class SculptPanel {
     }
 
     hint() {
-        this.message.textContent = TOOLS[this.tool].hints[this.hits.length];
+        this.message.textContent = hintOf(this.tool, this.hits.length);
     }
 
     /** after `hello`, with the box of the scene @param {number[]} low @param {number[]} high */
@@ -146,8 +156,9 @@ export class SculptPanel {
     showValues() {
         const { distance_m, radius_m, sharpness, pressure_Pa, lift_m } = this.settings();
         const mm = (/** @type {number} */ m) => (1000 * m).toFixed(1) + " mm";
-        const show = (/** @type {string} */ name, /** @type {string} */ text) => {
-            htmlById(`sculpt-${name}-value`, this.page).textContent = text;
+        const show = (/** @type {string} */ name, /** @type {string} */ value) => {
+            htmlById(`sculpt-${name}-value`, this.page).textContent = value;
+            this.slider(name).ariaValueText = value;
         };
         show("distance", mm(distance_m));
         show("radius", mm(radius_m));
@@ -215,7 +226,10 @@ export class SculptPanel {
     cut() {
         const axis = /** @type {"none" | "x" | "y" | "z"} */ (this.axis.value);
         const command = cutCommand(axis, Number(this.slider("cut").value) / SLIDER_STEPS, this.box);
-        this.slider("cut").disabled = command.verb === "uncut";
+        const cuts = command.verb === "cut";
+        this.slider("cut").disabled = !cuts;
+        if (cuts)
+            this.slider("cut").ariaValueText = `${this.axis.value} = ${(1000 * command.args.offset_m).toFixed(1)} mm`;
         if (this.isBusy()) this.nextCut = command;
         else this.submit(command);
     }
@@ -236,19 +250,21 @@ export class SculptPanel {
         this.button("redo").disabled = answer.args.can_redo === 0;
     }
 
-    /** @param {string} text of an error @returns {boolean} it belongs to this panel */
-    refused(text) {
+    /** @param {string} sentence of an error @returns {boolean} it belongs to this panel */
+    refused(sentence) {
         if (!this.pending) return false;
         if (FORCES.includes(this.pending.verb)) this.setForce(null);
-        this.finish(text);
+        this.finish(refusalText(sentence));
+        this.message.title = sentence; // for experts
         return true;
     }
 
-    /** @param {string} text */
-    finish(text) {
+    /** @param {string} message */
+    finish(message) {
         this.pending = null;
         this.showBusy();
-        this.message.textContent = text;
+        this.message.textContent = message;
+        this.message.title = "";
         const cut = this.nextCut;
         this.nextCut = null;
         if (cut) this.submit(cut);
@@ -259,13 +275,20 @@ export class SculptPanel {
         htmlById("sculpt", this.page).setAttribute("aria-busy", String(this.pending !== null));
     }
 
-    /** Ctrl+Z, Ctrl+Shift+Z @param {KeyboardEvent} e @returns {boolean} the key is one of them */
+    /** Ctrl+Z, Ctrl+Shift+Z, and while the panel is open the letters of the tools @param {KeyboardEvent} e @returns {boolean} the key is one of them */
     key(e) {
-        const typing = e.target instanceof HTMLInputElement && e.target.type !== "range";
-        if (!this.offered || !(e.ctrlKey || e.metaKey) || e.altKey || e.repeat || e.key.toLowerCase() !== "z")
-            return false;
-        if (typing) return false;
-        this.submit({ verb: e.shiftKey ? "redo" : "undo", args: {} });
+        const { target } = e;
+        const typing =
+            target instanceof HTMLSelectElement || (target instanceof HTMLInputElement && target.type !== "range");
+        if (!this.offered || typing || e.altKey || e.repeat) return false;
+        const key = e.key.toUpperCase();
+        if (e.ctrlKey || e.metaKey) {
+            if (key === "Z") this.submit({ verb: e.shiftKey ? "redo" : "undo", args: {} });
+            return key === "Z";
+        }
+        const tool = Object.keys(TOOLS).find((name) => TOOLS[name].key === key);
+        if (!tool || e.shiftKey || htmlById("sculpt", this.page).hidden) return false;
+        this.choose(tool);
         return true;
     }
 }
