@@ -18,6 +18,7 @@ import { Messages } from "./messages.js";
 import { OrientationCube } from "./orientation.js";
 import { OtherTools } from "./other_tools.js";
 import { pressDepth, withOwnTool } from "./own_tool.js";
+import { materialField, PaintColours } from "./paint_colours.js";
 import { PlanPanel } from "./plan_panel.js";
 import { PlaybackBar } from "./playback_bar.js";
 import { Plots } from "./plots.js";
@@ -80,7 +81,11 @@ const input = new ToolInput(
     (tip) => marks.hand(state.ownTool, tip),
 );
 const highlight = new SculptHighlight(stage, state, sculpt);
-sculpt.onChange = () => highlight.refresh();
+const colours = new PaintColours(state, fields);
+sculpt.onChange = () => {
+    highlight.refresh();
+    colours.show(highlight.on ? materialField(sculpt.tool, sculpt.paint()) : null);
+};
 sculpt.nameOf = (/** @type {number} */ part) => state.parts[part]?.name ?? "";
 input.onClick = (/** @type {import("./tool_input.js").Hit} */ hit) => sculpt.click(hit);
 input.onHover = (/** @type {import("./tool_input.js").Hit | null} */ hit) => highlight.hover(hit);

@@ -47,6 +47,7 @@ export class SculptHighlight {
         if (this.on === on) return;
         this.on = on;
         this.hover(null);
+        this.panel.onChange();
         if (on) void this.load();
     }
 

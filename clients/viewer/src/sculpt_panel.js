@@ -135,15 +135,19 @@ export class SculptPanel {
         this.box = boxAround(this.box, rest);
     }
 
+    /** what the brush does @returns {string} key of PAINTS */
+    paint() {
+        return [...this.paints].find(([, button]) => button.tabIndex === 0)?.[0] ?? "stiffer";
+    }
+
     /** @returns {import("./sculpt_commands.js").Settings} */
     settings() {
         const share = (/** @type {string} */ name) => Number(this.slider(name).value) / SLIDER_STEPS;
-        const paint = [...this.paints].find(([, b]) => b.tabIndex === 0)?.[0] ?? "stiffer";
         return {
             distance_m: share("distance") * 0.5 * this.size,
             scale: 1,
             radius_m: share("radius") * 0.5 * this.size,
-            paint,
+            paint: this.paint(),
             sharpness: Math.round(share("sharpness") * 10) / 2,
             entity: Number(selectById("sculpt-entity", this.page).value),
             pressure_Pa: 10 ** (1 + 3 * share("pressure")),
@@ -239,6 +243,7 @@ export class SculptPanel {
         this.hits = [];
         this.setForce(null);
         this.button("undo").disabled = this.button("redo").disabled = false;
+        this.onChange();
     }
 
     /** @param {import("./control_table.js").Answer} answer */
