@@ -122,6 +122,23 @@ const cutTilt = (page) =>
         });
         return { n, tilt };
     });
+/** stiffness that is shown in colour at a pixel, and the smallest of the body, Pa; 0: not yet; null: no such field */
+const stiffnessAt = (page, { x, y }) =>
+    page.evaluate(
+        (at) => {
+            const { input, stage, state } = window.palpate;
+            if (!state.parts[0].fields.includes("young")) return null;
+            const body = state.bodies.get(0);
+            const { newer, uniforms, values } = body.colours;
+            const hit = input.pick(stage.ray(at.x, at.y));
+            if (state.field !== "young" || !values || !hit) return { there: 0, elsewhere: 0 };
+            const { x: low, y: high } = uniforms.newer.value;
+            const value = (v) => low + ((high - low) * newer.array[v]) / 255;
+            const corners = body.triangles().subarray(3 * hit.triangle, 3 * hit.triangle + 3);
+            return { there: Math.max(...corners.map(value)), elsewhere: low };
+        },
+        { x, y },
+    );
 const tool = (page, name) => page.click(`#sculpt-tools button[data-name=${name}]`);
 const drawn = async (page) =>
     until(
@@ -277,6 +294,21 @@ await run(async () => {
     await ada.mouse.click(spot.x, spot.y);
     const painted = await after(ada, redone.epoch);
     check("painting is answered", painted.message === "Painted.", painted.message);
+    // the stroke is seen, though the chair sleeps
+    const colours = await until(
+        () => stiffnessAt(ada, spot),
+        (c) => !c || c.there > 1.5 * c.elsewhere,
+    );
+    if (!colours) console.log("     the server does not offer the stiffness in colour");
+    else {
+        check(
+            "what was painted has another colour",
+            colours.there > 1.5 * colours.elsewhere,
+            `${(1e-3 * colours.there).toFixed(1)} kPa, elsewhere ${(1e-3 * colours.elsewhere).toFixed(1)} kPa`,
+        );
+        await drawn(ada);
+        await ada.screenshot({ path: join(pictures, "sculpt_painted.png") });
+    }
     const stiff = await probe();
     check("the probe displays the painted material", stiff === "Stiffness 10 kPa, density 4000 kg/m³", stiff);
 

@@ -18,8 +18,7 @@ export class BodySet {
         this.state = state;
         this.stage = stage;
         this.giveBack = giveBack;
-        /** @type {Map<number, BodyMesh>} of a new topology, until its first frame */
-        this.pending = new Map();
+        this.pending = state.pendingBodies;
         /** @type {BodyMesh[]} replaced, until the next picture: what they share with the renderer is kept */
         this.retired = [];
         /** @type {Map<number, FrameArrays & {shown: import("./topology_delta.js").Shown | null}>} newest frame of each part
@@ -67,6 +66,7 @@ export class BodySet {
         const former = this.state.bodies.get(part);
         if (former) {
             former.appear(false);
+            body.colours.adopt(former.colours, performance.now());
             this.retired.push(former);
         }
         body.appear(true);

@@ -39,6 +39,18 @@ export class FieldColours {
         this.enable(true);
     }
 
+    /**
+     * Values of the topology before, until its own arrive: the surface does not flash in its natural colour.
+     * @param {FieldColours} former @param {number} now ms
+     */
+    adopt(former, now) {
+        const { values, uniforms, newer } = former;
+        if (this.values || !values || newer.array.length !== this.newer.array.length) return;
+        const [low, high] = uniforms.newer.value.toArray();
+        this.take(/** @type {Uint8Array} */ (newer.array), low, high, now, null);
+        this.setRange({ low: uniforms.range.value.x, high: uniforms.range.value.y });
+    }
+
     /** shows tissue, until values of another field arrive */
     drop() {
         this.values = null;
