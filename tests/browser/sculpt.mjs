@@ -347,6 +347,14 @@ await run(async () => {
     await ada.selectOption("#sculpt-axis", "x");
     const cut = await after(ada, painted.epoch);
     check("a cut hides a part", cut.triangles < painted.triangles, summary(cut));
+    await ada.focus("#sculpt-cut");
+    check(
+        "the plane of the cut is shown while its slider is in use",
+        (await until(() => ada.evaluate(() => window.palpate.highlight.marks.lines.geometry.instanceCount))) >= 4,
+        await ada.getAttribute("#sculpt-cut", "aria-valuetext"),
+    );
+    await drawn(ada);
+    await ada.screenshot({ path: join(pictures, "sculpt_plane.png") });
     const flat = await until(() => cutTilt(ada));
     check(
         "no normal on the cut is tilted by what lies beyond its edge",
@@ -368,6 +376,22 @@ await run(async () => {
     const whole = await after(ada, cut.epoch);
     check("the whole is shown again", same(whole, painted), summary(whole));
 
+    // without a mouse: Enter shows the middle of the picture, and once more clicks
+    await tool(ada, "sharpen");
+    await ada.focus("#view");
+    await ada.keyboard.press("Enter");
+    const aimed = await until(() =>
+        ada.evaluate(() => window.palpate.input.mouse?.byKeyboard && window.palpate.highlight.picked),
+    );
+    await ada.keyboard.press("Enter");
+    const sharpened = (await answered(ada, "sharpen")).args;
+    check(
+        "Enter shows what it will change, and once more changes it",
+        samePick(aimed, sharpened),
+        JSON.stringify(aimed),
+    );
+    const sharp = await after(ada, whole.epoch);
+
     // a refusal is displayed in the panel and changes nothing
     await tool(ada, "merge");
     for (let i = 0; i < 2; i++) await ada.mouse.click(spot.x, spot.y);
@@ -377,7 +401,7 @@ await run(async () => {
     );
     check(
         "an impossible command is refused with a sentence",
-        refused.message === "Choose two different faces." && refused.epoch === whole.epoch,
+        refused.message === "Choose two different faces." && refused.epoch === sharp.epoch,
         refused.message,
     );
     checkConsoles();

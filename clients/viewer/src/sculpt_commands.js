@@ -27,6 +27,8 @@ export const TOOLS = Object.freeze({
 /** what to do before each click of a tool @param {string} tool of TOOLS @param {number} clicks so far */
 export const hintOf = (tool, clicks) => text(/** @type {TextKey} */ (`sculpt.hint.${tool}.${clicks}`));
 
+const CUT_MARGIN = 0.04; // of the box: the outline of a cut stands out by so much
+
 /** tools that are forces: they act until they are released, and follow their slider */
 export const FORCES = Object.freeze(["inflate", "deflate", "curve"]);
 
@@ -90,6 +92,24 @@ export function cutCommand(axis, share, box) {
     const args = { nx: 0, ny: 0, nz: 0, offset_m: box.low[k] + share * (box.high[k] - box.low[k]) };
     args[/** @type {"nx" | "ny" | "nz"} */ ("n" + axis)] = 1;
     return { verb: "cut", args };
+}
+
+/**
+ * Outline of the plane of a cut, a little larger than the box: pairs of points.
+ * @param {"none" | "x" | "y" | "z"} axis @param {number} share 0..1 @param {Box} box @returns {number[][]}
+ */
+export function cutOutline(axis, share, box) {
+    const k = ["x", "y", "z"].indexOf(axis);
+    if (k < 0) return [];
+    const { low, high } = box;
+    const corner = (/** @type {number} */ p, /** @type {number} */ q) => {
+        const end = [0, 0, 0];
+        [end[k], end[(k + 1) % 3], end[(k + 2) % 3]] = [share, p, q];
+        return low.map((v, c) => v + end[c] * (high[c] - v));
+    };
+    const [near, far] = [-CUT_MARGIN, 1 + CUT_MARGIN];
+    const corners = [corner(near, near), corner(far, near), corner(far, far), corner(near, far)];
+    return corners.flatMap((point, i) => [point, corners[(i + 1) % 4]]);
 }
 
 /** box around a box and points @param {Box} box @param {Float32Array} x [n][3] @returns {Box} */

@@ -143,6 +143,7 @@ export class SculptHighlight {
         this.marks.draw(
             this.body,
             this.body?.mesh.visible ? this.previews : [],
+            this.on ? this.panel.plane() : [],
             ABOVE * stage.size,
             DOT_PX / stage.pixelsPerMetre(),
         );
@@ -184,10 +185,10 @@ class Marks {
 
     /**
      * @param {import("./body_mesh.js").BodyMesh | null} body @param {Preview[]} previews
-     * @param {number} above_m @param {number} dot_m radius of a dot
+     * @param {number[][]} plane outline of a cut @param {number} above_m @param {number} dot_m radius of a dot
      */
-    draw(body, previews, above_m, dot_m) {
-        const points = [];
+    draw(body, previews, plane, above_m, dot_m) {
+        const points = [...plane];
         const dots = [];
         for (const preview of body ? previews : []) {
             const { position, normal } = /** @type {import("./body_mesh.js").BodyMesh} */ (body);

@@ -1,7 +1,17 @@
 // The panel of sculpting: the tool of a click and its settings, forces that follow their slider until they are released,
 // undo, the cut, files. One command is pending at a time.
 import { buttonById, chooseByArrows, htmlById, inputById, markRadio, selectById } from "./dom.js";
-import { answerText, boxAround, commandOf, cutCommand, FORCES, hintOf, PAINTS, TOOLS } from "./sculpt_commands.js";
+import {
+    answerText,
+    boxAround,
+    commandOf,
+    cutCommand,
+    cutOutline,
+    FORCES,
+    hintOf,
+    PAINTS,
+    TOOLS,
+} from "./sculpt_commands.js";
 import { refusalText } from "./sculpt_refusals.js";
 import { text } from "./text.js";
 
@@ -26,6 +36,7 @@ export class SculptPanel {
         this.tool = "extrude";
         /** @type {Hit[]} clicked so far */
         this.hits = [];
+        this.aims = false; // the slider of the cut is in use
         /** called when the tool, its settings or the clicked places have changed */
         this.onChange = () => {};
         /** @type {(part: number) => string} name of a part, "" if it cannot be sculpted */
@@ -61,6 +72,8 @@ export class SculptPanel {
         this.button("release").onclick = () => this.submit({ verb: "release", args: {} });
         this.axis = selectById("sculpt-axis", page);
         this.axis.onchange = this.slider("cut").oninput = () => this.cut();
+        for (const on of ["pointerenter", "focus"]) this.slider("cut").addEventListener(on, () => this.aim(true));
+        for (const off of ["pointerleave", "blur"]) this.slider("cut").addEventListener(off, () => this.aim(false));
         this.choose(this.tool);
     }
 
@@ -227,6 +240,18 @@ export class SculptPanel {
         this.showBusy();
     }
 
+    /** @param {boolean} on the plane of the cut is shown */
+    aim(on) {
+        this.aims = on && !this.slider("cut").disabled;
+        this.onChange();
+    }
+
+    /** outline of the plane of the cut while its slider is in use @returns {number[][]} */
+    plane() {
+        const axis = /** @type {"none" | "x" | "y" | "z"} */ (this.axis.value);
+        return this.aims ? cutOutline(axis, Number(this.slider("cut").value) / SLIDER_STEPS, this.box) : [];
+    }
+
     cut() {
         const axis = /** @type {"none" | "x" | "y" | "z"} */ (this.axis.value);
         const command = cutCommand(axis, Number(this.slider("cut").value) / SLIDER_STEPS, this.box);
@@ -234,6 +259,7 @@ export class SculptPanel {
         this.slider("cut").disabled = !cuts;
         if (cuts)
             this.slider("cut").ariaValueText = `${this.axis.value} = ${(1000 * command.args.offset_m).toFixed(1)} mm`;
+        this.onChange();
         if (this.isBusy()) this.nextCut = command;
         else this.submit(command);
     }

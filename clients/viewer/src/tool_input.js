@@ -31,8 +31,8 @@ export class ToolInput {
         this.onClick = () => {};
         /** @type {(hit: Hit | null) => void} called with the place under the mouse while sculpting */
         this.onHover = () => {};
-        /** @type {{x: number, y: number, at: number, picture: number} | null} mouse over the picture; at, picture: time in ms
-         * and number of the picture of the last look, -1: the mouse has moved since */
+        /** @type {{x: number, y: number, at: number, picture: number, byKeyboard: boolean} | null} mouse over the picture, or
+         * where the keyboard points; at, picture: time in ms and number of the picture of the last look, -1: moved since */
         this.mouse = null;
         /** @type {{id: number, at: Hit, x: number, y: number} | null} place where the button went down */
         this.clickStart = null;
@@ -138,9 +138,9 @@ export class ToolInput {
         last.y = e.clientY;
     }
 
-    /** the mouse moves over the picture; null: it has left @param {{clientX: number, clientY: number} | null} e */
-    hover(e) {
-        this.mouse = e && { x: e.clientX, y: e.clientY, at: this.mouse?.at ?? -Infinity, picture: -1 };
+    /** the mouse moves over the picture; null: it has left @param {{clientX: number, clientY: number} | null} e @param {boolean} byKeyboard */
+    hover(e, byKeyboard = false) {
+        this.mouse = e && { x: e.clientX, y: e.clientY, at: this.mouse?.at ?? -Infinity, picture: -1, byKeyboard };
         if (!e && this.pointers.size === 0) this.onHover(null);
     }
 

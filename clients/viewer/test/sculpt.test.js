@@ -3,7 +3,17 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { joinSurfaces, toObj, toPly, toStl, WRITERS } from "../src/exporters.js";
-import { answerText, boxAround, commandOf, cutCommand, FORCES, liftOf, PAINTS, TOOLS } from "../src/sculpt_commands.js";
+import {
+    answerText,
+    boxAround,
+    commandOf,
+    cutCommand,
+    cutOutline,
+    FORCES,
+    liftOf,
+    PAINTS,
+    TOOLS,
+} from "../src/sculpt_commands.js";
 import { refusalText } from "../src/sculpt_refusals.js";
 import { isTextKey, text } from "../src/text.js";
 
@@ -145,6 +155,10 @@ test("a cut is a plane within the box, perpendicular to its axis", () => {
     assert.deepEqual(cutCommand("y", 0.25, box), { verb: "cut", args: { nx: 0, ny: 1, nz: 0, offset_m: 1 } });
     assert.deepEqual(cutCommand("z", 1, box).args, { nx: 0, ny: 0, nz: 1, offset_m: 3 });
     assert.deepEqual(cutCommand("none", 0.5, box), { verb: "uncut", args: {} });
+    assert.deepEqual(cutOutline("none", 0.5, box), []);
+    const outline = cutOutline("y", 0.25, box);
+    assert.equal(outline.length, 8);
+    for (const [x, y, z] of outline) assert.ok(y === 1 && (x < -1 || x > 1) && (z < 2 || z > 3));
     assert.deepEqual(boxAround(box, Float32Array.of(-2, 1, 2.5, 0, 5, 2)), { low: [-2, 0, 2], high: [1, 5, 3] });
 });
 
