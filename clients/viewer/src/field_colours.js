@@ -48,7 +48,11 @@ export class FieldColours {
         if (this.values || !values || newer.array.length !== this.newer.array.length) return;
         const [low, high] = uniforms.newer.value.toArray();
         this.take(/** @type {Uint8Array} */ (newer.array), low, high, now, null);
-        this.setRange({ low: uniforms.range.value.x, high: uniforms.range.value.y });
+        // as it was shown
+        this.uniforms.mix.value = uniforms.mix.value;
+        this.uniforms.range.value.copy(uniforms.range.value);
+        this.uniforms.stops.value.forEach((stop, i) => stop.copy(uniforms.stops.value[i]));
+        if (this.material) Object.assign(this.material, MATT);
     }
 
     /** shows tissue, until values of another field arrive */
