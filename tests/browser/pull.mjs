@@ -51,8 +51,8 @@ const hideTip = (page, index) =>
         const { input, marks, stage } = window.palpate;
         const tip = marks.marks[tool].ball.position;
         for (let k = 0; k < 24; k++) {
-            stage.azimuth += Math.PI / 12;
-            stage.placeCamera();
+            stage.orbit(40, 0);
+            stage.placeCameras();
             const pixel = stage.project(tip);
             const hit = input.pick(stage.ray(pixel.x, pixel.y));
             if (hit && hit.distance < tip.distanceTo(stage.camera.position) - 0.01) return pixel;
