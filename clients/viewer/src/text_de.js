@@ -450,7 +450,7 @@ export const GERMAN = {
     "views.endoscope": "Endoskop",
     "views.endoscope.tip": "Durch ein Endoskop sehen (E)",
     "views.endoscope.how":
-        "Neben dem Organ oder auf dem dunklen Rand ziehen schwenkt das Endoskop um seinen Port. Das Mausrad schiebt es vor und zurück.",
+        "Neben dem Organ oder auf dem dunklen Rand ziehen schwenkt das Endoskop um seinen Port. Das Mausrad oder zwei Finger schieben es vor und zurück.",
     "views.angled": "30°-Optik",
     "views.angled.tip": "Eine Optik, die 30 Grad schräg zum Schaft blickt",
     "views.turn": "Drehung der Optik",

@@ -448,7 +448,7 @@ export const ENGLISH = {
     "views.endoscope": "Endoscope",
     "views.endoscope.tip": "Look through an endoscope (E)",
     "views.endoscope.how":
-        "Drag beside the organ or on the dark rim to turn the endoscope about its port. The wheel inserts and withdraws it.",
+        "Drag beside the organ or on the dark rim to turn the endoscope about its port. The wheel, or two fingers, inserts and withdraws it.",
     "views.angled": "30° optics",
     "views.angled.tip": "Optics that look 30 degrees aside from the shaft",
     "views.turn": "Turn of the optics",
