@@ -129,7 +129,9 @@ await run(async () => {
     );
 
     const shown = await until(() =>
-        page.evaluate(() => Boolean([...window.palpate.state.bodies.values()][0].mesh.material.map)),
+        page.evaluate(() =>
+            [...window.palpate.state.bodies.values()].every(({ mesh }) => mesh.visible && mesh.material.map),
+        ),
     );
     check("the page shows it", shown);
     await page.evaluate(() => {
