@@ -134,7 +134,7 @@ function showForce() {
 }
 
 let nDrawn = 0;
-let toldSlow = false; // that this browser draws slowly: once
+let slowIsKnown = false; // that this browser draws slowly: once
 let countedAt = performance.now();
 function draw() {
     requestAnimationFrame(draw);
@@ -181,8 +181,8 @@ function picture() {
     }
     if (now - countedAt > 1000) {
         state.figures.fps = (1000 * nDrawn) / (now - countedAt);
-        if (stage.pace.struggles && !toldSlow) {
-            toldSlow = true;
+        if (stage.pace.struggles && !slowIsKnown) {
+            slowIsKnown = true;
             layout.notice(
                 text("notice.slow_browser", { n: Math.max(1, Math.round(state.figures.fps)) }),
                 SLOW_NOTICE_MS,
