@@ -96,7 +96,7 @@ const ringRadius = (page) =>
         // a metre is larger where the surface is nearer than the middle of the view
         const away = stage.camera.position.clone().sub(stage.target).normalize();
         const depth = stage.camera.position.clone().sub(centre).dot(away);
-        return { shown, brush: (sculpt.settings().radius_m * stage.pixelsPerMetre() * stage.distance) / depth };
+        return { shown, brush: (sculpt.settings().radius_m * stage.pixelsPerMetre() * stage.view.depth()) / depth };
     });
 /** largest angle between a triangle of the cut and the normals of its corners (102 degrees without creases); null: the control cells are not there yet */
 const cutTilt = (page) =>
