@@ -81,8 +81,9 @@ typedef struct pal_wire_part_info {
     char field[PAL_WIRE_FIELDS_MAX][PAL_WIRE_FIELD_BYTES]; /* "displacement", "von_mises" ...           */
     char interior[PAL_WIRE_NAME_BYTES]; /* path of the asset of its interior, as `asset`; "": it has none */
     bool is_sculptable; /* its control cells and material can be changed by commands; false is not on the wire */
-    bool is_adaptive;   /* its triangles change; clients that accept TOPOLOGY_DELTA get the changes, and n_triangle
-                           counts slots */
+    char control_cells[PAL_WIRE_NAME_BYTES]; /* of a sculptable part: path as `asset`; "" is not on the wire */
+    bool is_adaptive; /* its triangles change; clients that accept TOPOLOGY_DELTA get the changes, and n_triangle
+                         counts slots */
     char appearance[PAL_WIRE_LOOK_BYTES]; /* "liver", "plastic" ...; "": unknown, and not on the wire  */
     char colour[PAL_WIRE_LOOK_BYTES];     /* "#rrggbb" in place of the appearance's own; "": its own   */
 } pal_wire_part_info;                     /* its index in the array is the part index   */

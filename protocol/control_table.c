@@ -22,6 +22,7 @@ static const pal_control_field part_fields[] = {{"name", TEXT, true, ONE(part_in
                                                 {"sculptable", BOOL, false, ONE(part_info, is_sculptable)},
                                                 {"appearance", TEXT_OR_EMPTY, false, ONE(part_info, appearance)},
                                                 {"colour", TEXT_OR_EMPTY, false, ONE(part_info, colour)},
+                                                {"control_cells", TEXT_OR_EMPTY, false, ONE(part_info, control_cells)},
                                                 {0}};
 static const pal_control_field tool_fields[] = {{"name", TEXT, true, ONE(tool_info, name)},
                                                 {"radius_m", F64, true, ONE(tool_info, radius_m)},

@@ -280,6 +280,7 @@ static pal_packet *find_asset(const pal_hub_room *room, const char *path)
         if (!strcmp(part->info.asset, path)) return part->asset;
         if (!strcmp(part->info.interior, path)) return part->interior_asset;
         if (part->image && !strcmp(part->info.image, path)) return part->image;
+        if (part->control_cells && !strcmp(part->info.control_cells, path)) return part->control_cells;
     }
     for (int i = 0; i < PAL_HUB_OLD_ASSETS; i++)
         if (room->past[i].asset && !strcmp(room->past[i].path, path)) return room->past[i].asset;

@@ -93,7 +93,7 @@ static bool read_cells(pal_client *c, int kind, const pal_wire_command *command,
                                              .distance_m = pal_hub_arg(command, "distance_m", 0),
                                              .scale = pal_hub_arg(command, "scale", 1),
                                              .sharp = (float)pal_hub_arg(command, "sharpness", 0)};
-    pal_sculptor_find(job->sculptor, a.face, a.rest_m, &job->command.cells);
+    pal_sculpt_find(pal_sculptor_cells(job->sculptor), a.face, a.rest_m, &job->command.cells);
     return true;
 }
 
@@ -172,6 +172,15 @@ static void commit_edit(pal_hub_body_edits *at, pal_job *job, pal_job_products *
     job->made.edit = NULL;
 }
 
+/* the control face, its cell, and its edge and vertex that were picked */
+static void answer_picked(pal_wire_answer *a, const pal_cells_command *at)
+{
+    pal_hub_answer_arg(a, "face", at->face);
+    pal_hub_answer_arg(a, "cell", at->cell);
+    pal_hub_answer_arg(a, "edge", at->edge);
+    pal_hub_answer_arg(a, "vertex", at->vertex);
+}
+
 static void answer_edit(pal_client *c, const pal_job *job)
 {
     pal_wire_answer *a = pal_hub_answer_begin(c, job->verb);
@@ -182,6 +191,7 @@ static void answer_edit(pal_client *c, const pal_job *job)
     pal_hub_answer_arg(a, "can_undo", pal_sculptor_undo_count(job->sculptor));
     pal_hub_answer_arg(a, "can_redo", pal_sculptor_redo_count(job->sculptor));
     pal_hub_answer_arg(a, "prepare_ms", prepare_ms);
+    if (job->command.kind == PAL_SCULPT_CELLS) answer_picked(a, &job->command.cells);
     pal_hub_send(c);
 }
 
@@ -208,6 +218,7 @@ bool pal_hub_run_edit(pal_client *c, const pal_verb *verb, const pal_wire_comman
 bool pal_hub_run_probe(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
     int body = find_body(c, command);
+    pal_cells_command picked;
     pal_material m;
     pal_pick at;
     if (body < 0 || !pick(c, body, command, false, &at)) return false;
@@ -216,13 +227,14 @@ bool pal_hub_run_probe(pal_client *c, const pal_verb *verb, const pal_wire_comma
     *def = pal_session_scene(c->room->session)->body[body];
     pal_session_material(c->room->session, body, &def->material);
     pal_material_painted(def, at.rest_m, &m);
+    pal_sculpt_find(def->cells, at.face, at.rest_m, &picked);
     free(def);
     pal_wire_answer *to = pal_hub_answer_begin(c, verb->name);
     snprintf(to->text, sizeof to->text, "probe: E %.4g Pa, density %.4g kg/m3", m.young_Pa, m.density_kg_m3);
     pal_hub_answer_arg(to, "young_Pa", m.young_Pa);
     pal_hub_answer_arg(to, "poisson", m.poisson);
     pal_hub_answer_arg(to, "density_kg_m3", m.density_kg_m3);
-    pal_hub_answer_arg(to, "face", at.face);
+    answer_picked(to, &picked);
     pal_hub_send(c);
     return true;
 }

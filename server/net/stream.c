@@ -8,6 +8,7 @@
 #include "server/base/vec3.h"
 #include "server/net/transport/plain_text.h"
 #include "server/net/tuning.h"
+#include "server/session/control_cells.h"
 #include "server/session/tuning.h"
 
 #include <math.h>
@@ -21,6 +22,16 @@ static pal_err refuse(pal_diagnostic *diag, int refusal, const char *part, const
 {
     return pal_diagnostic_set(diag, refusal == PAL_REFUSAL_MEMORY ? PAL_ERR_MEMORY : PAL_ERR_REFUSED, "part %s: %s: %s",
                               part, what, pal_refusal_text(refusal));
+}
+
+/* makes a file of a part, which is named after its content; path: PAL_WIRE_NAME_BYTES */
+static pal_err make_file(const void *bytes, size_t n_byte, char *path, pal_packet **out)
+{
+    char hash[PAL_ASSET_HASH_CHARS];
+    *out = pal_packet_create(bytes, n_byte, false);
+    pal_asset_hash(bytes, n_byte, hash);
+    snprintf(path, PAL_WIRE_NAME_BYTES, "/asset/%s", hash);
+    return *out ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 static void drop_fields(pal_stream_part *part)
@@ -64,28 +75,34 @@ static pal_err open_interior(pal_stream_part *part, const pal_shown *shown, pal_
 {
     uint8_t *bytes = NULL;
     size_t n_byte = 0;
-    char hash[PAL_ASSET_HASH_CHARS];
     if (shown->n_tet == 0 || shown->n_tet > PAL_INTERIOR_TETS) return PAL_ERR_OK;
     const int refusal = encode_interior(shown, &bytes, &n_byte);
     if (refusal)
         return pal_diagnostic_set(diag, refusal == PAL_REFUSAL_MEMORY ? PAL_ERR_MEMORY : PAL_ERR_REFUSED,
                                   "part %s: no asset of its interior: %s", shown->name, pal_refusal_text(refusal));
-    part->interior_asset = pal_packet_create(bytes, n_byte, false);
-    pal_asset_hash(bytes, n_byte, hash);
-    snprintf(part->info.interior, sizeof part->info.interior, "/asset/%s", hash);
+    pal_err err = make_file(bytes, n_byte, part->info.interior, &part->interior_asset);
     part->n_node = (uint32_t)shown->n_node;
     free(bytes);
-    return part->interior_asset ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    return err;
+}
+
+/* what a click on a sculptable part means */
+static pal_err open_control_cells(pal_stream *s, int index, const pal_shown *shown)
+{
+    pal_stream_part *part = &s->part[index];
+    double origin_m[3];
+    part->info.is_sculptable = shown->face != NULL;
+    if (!shown->face) return PAL_ERR_OK;
+    pal_sub3(origin_m, s->scene->body[index].mesh->surface.origin_m, s->scene->body[0].mesh->surface.origin_m);
+    char *text = pal_control_cells_text(s->scene->body[index].cells, origin_m, shown);
+    pal_err err = text ? make_file(text, strlen(text), part->info.control_cells, &part->control_cells) : PAL_ERR_MEMORY;
+    free(text);
+    return err;
 }
 
 static pal_err name_image(pal_stream_part *part, const pal_image *image)
 {
-    char hash[PAL_ASSET_HASH_CHARS];
-    part->image = pal_packet_create(image->bytes, image->n_byte, false);
-    if (!part->image) return PAL_ERR_MEMORY;
-    pal_asset_hash(image->bytes, image->n_byte, hash);
-    snprintf(part->info.image, sizeof part->info.image, "/asset/%s", hash);
-    return PAL_ERR_OK;
+    return make_file(image->bytes, image->n_byte, part->info.image, &part->image);
 }
 
 /* builds the asset and encoders of one part */
@@ -95,7 +112,6 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
     pal_frame_order *order = NULL;
     uint8_t *bytes = NULL;
     size_t n_byte = 0;
-    char hash[PAL_ASSET_HASH_CHARS];
     pal_err err = PAL_ERR_OK;
     const uint32_t *tri = (const uint32_t *)shown->tri; /* indices are nonnegative */
     const pal_image *image = shown->uv ? s->scene->body[index].image : NULL;
@@ -114,17 +130,15 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
         refusal = pal_frame_encoder_create(shown->rest_m, order, &s->encoder[index][t]);
         if (refusal) err = refuse(diag, refusal, shown->name, "no encoder");
     }
-    if (!err && !(part->asset = pal_packet_create(bytes, n_byte, false))) err = PAL_ERR_MEMORY;
+    if (!err) err = make_file(bytes, n_byte, part->info.asset, &part->asset);
+    if (!err) err = open_control_cells(s, index, shown);
     if (!err) {
-        pal_asset_hash(bytes, n_byte, hash);
-        snprintf(part->info.asset, sizeof part->info.asset, "/asset/%s", hash);
         if (image) err = name_image(part, image);
         pal_plain_text(part->info.name, sizeof part->info.name, shown->name);
         part->info.epoch = 1;
         part->info.n_vertex = (uint32_t)shown->n_vertex;
         part->info.n_triangle = (uint32_t)shown->n_tri;
         part->info.is_adaptive = shown->is_adaptive;
-        part->info.is_sculptable = shown->face != NULL;
         if (!err) err = open_interior(part, shown, diag);
         pal_plain_text(part->info.appearance, sizeof part->info.appearance, s->scene->body[index].appearance);
         pal_plain_text(part->info.colour, sizeof part->info.colour, s->scene->body[index].colour);
@@ -195,6 +209,7 @@ void pal_stream_close(pal_stream *stream)
     for (int p = 0; p < stream->n_part; p++) {
         pal_packet_drop(stream->part[p].asset);
         pal_packet_drop(stream->part[p].image);
+        pal_packet_drop(stream->part[p].control_cells);
         pal_triangle_slots_free(stream->part[p].slots);
         drop_fields(&stream->part[p]);
         for (int t = 0; t < PAL_STREAM_TIER_COUNT; t++) {

@@ -332,9 +332,9 @@ static double off_edge(const pal_cells *c, int32_t edge, const double at[3])
     return pal_dist3(near, at);
 }
 
-void pal_sculptor_find(const pal_sculptor *sculptor, int32_t face, const double at_m[3], pal_cells_command *out)
+void pal_sculpt_find(const pal_cells *cells, int32_t face, const double at_m[3], pal_cells_command *out)
 {
-    const pal_cells *c = &sculptor->now.cells;
+    const pal_cells *c = cells;
     int32_t first;
     double min_edge = INFINITY, min_vertex = INFINITY;
     out->face = face;

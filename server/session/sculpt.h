@@ -59,5 +59,5 @@ void pal_sculpt_edit_free(pal_sculpt_edit *edit);
 
 /* sets a boundary face, the control cell that owns it, and its edge and its vertex nearest to a rest position, body
  * frame; -1: no such face */
-void pal_sculptor_find(const pal_sculptor *sculptor, int32_t face, const double at_m[3], pal_cells_command *out);
+void pal_sculpt_find(const pal_cells *cells, int32_t face, const double at_m[3], pal_cells_command *out);
 #endif

@@ -133,7 +133,7 @@ const stretched = (page) =>
         const { stage, state } = window.palpate;
         const body = state.bodies.get(0); // they come in any order
         for (const other of state.bodies.values()) other.appear(other === body);
-        stage.elevation = 1.5; // from above: the top stays level, so that light stays the same
+        stage.free.elevation = 1.5; // from above: the top stays level, so that light stays the same
         const points = [];
         for (let u = -1; u <= 1; u += 0.05) for (let v = -1; v <= 1; v += 0.1) points.push([u, v]);
         const top = body.position.array.reduce((max, v, i) => (i % 3 === 2 ? Math.max(max, v) : max), -1);
@@ -156,7 +156,7 @@ const stretched = (page) =>
         const same = sample(1);
         body.take(original, body.normal.array);
         for (const other of state.bodies.values()) other.appear(true);
-        stage.elevation = 0.42;
+        stage.free.elevation = 0.42;
         // neighbours along u less each other
         const detail = (c) => c.slice(0, -21).map((v, i) => v - c[i + 21]);
         const correlation = (a, b) => {

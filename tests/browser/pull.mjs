@@ -51,8 +51,8 @@ const hideTip = (page, index) =>
         const { input, marks, stage } = window.palpate;
         const tip = marks.marks[tool].ball.position;
         for (let k = 0; k < 24; k++) {
-            stage.azimuth += Math.PI / 12;
-            stage.placeCamera();
+            stage.orbit(40, 0);
+            stage.placeCameras();
             const pixel = stage.project(tip);
             const hit = input.pick(stage.ray(pixel.x, pixel.y));
             if (hit && hit.distance < tip.distanceTo(stage.camera.position) - 0.01) return pixel;
@@ -203,11 +203,11 @@ await run(async () => {
     // three turns of 15 degrees; the shaft stays where it is
     const turn = (a, b) =>
         (2 * Math.acos(Math.min(1, Math.abs(a.reduce((s, v, k) => s + v * b[k], 0)))) * 180) / Math.PI;
-    const turned = await until(
+    const rolled = await until(
         async () => turn(await roll(ben), straight),
         (angle) => Math.abs(angle - 45) < 1,
     );
-    check("it turns about its shaft by keys", Math.abs(turned - 45) < 1, `${turned.toFixed(1)} degrees`);
+    check("it turns about its shaft by keys", Math.abs(rolled - 45) < 1, `${rolled.toFixed(1)} degrees`);
     const behind = await hideTip(ben, holders[0]);
     const through = behind ? await coverage(ben, holders[0], behind) : 0;
     check("also through the tissue that hides its tip", through > 0.05, `${(100 * through).toFixed(0)} % there`);

@@ -129,12 +129,14 @@ await run(async () => {
     );
 
     const shown = await until(() =>
-        page.evaluate(() => Boolean([...window.palpate.state.bodies.values()][0].mesh.material.map)),
+        page.evaluate(() =>
+            [...window.palpate.state.bodies.values()].every(({ mesh }) => mesh.visible && mesh.material.map),
+        ),
     );
     check("the page shows it", shown);
     await page.evaluate(() => {
-        window.palpate.stage.azimuth = Math.PI / 2; // from +x, where the seam is
-        window.palpate.stage.elevation = 0.1;
+        window.palpate.stage.free.azimuth = Math.PI / 2; // from +x, where the seam is
+        window.palpate.stage.free.elevation = 0.1;
     });
     const at = (u, z) => [60 * Math.cos(2 * Math.PI * u) * 1e-3, 60 * Math.sin(2 * Math.PI * u) * 1e-3, z];
     const box = await page.evaluate(() => window.palpate.state.hello.box_max_m);

@@ -167,6 +167,39 @@ run prepare soup.obj -o soup2 --no-tetgen --units mm
 refused 1 "soup.obj: line 5: corners of neighbouring triangles miss each other by up to 0.0[0-9]* in the file's unit, and gaps of at most 0.00[0-9]* are closed"
 end
 
+begin "prepare takes the image of an OBJ file that lies beside it, and no other"
+{ printf 'mtllib box.mtl\nusemtl skin\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n'; awk '$1 == "v" { print } $1 == "f" { print "f", $2 "/1", $3 "/2", $4 "/3", $5 "/4" }' box.obj; } >image.obj
+png() { printf '\211PNG\r\n\032\n\000\000\000\rIHDR\000\000\000\002\000\000\000\001\010\002\000\000\000\000\000\000\000'; }
+run prepare image.obj -o image --no-tetgen --units mm
+check "a file of materials that is not there is a fault: $code" code_is 0
+check "it is not missed" has out "no image: box.mtl is not there"
+printf 'newmtl skin\nmap_Kd skin.png\n' >box.mtl
+run prepare image.obj -o image --no-tetgen --units mm
+check "an image that is not there is not missed" has out "no image: skin.png is not there"
+check "an image is written" test "$(grep -c '"image":' image/scene.json)" -eq 0
+png >skin.png
+run prepare image.obj -o image --no-tetgen --units mm
+check "exit code $code" code_is 0
+check "the image is not told" has out "image skin.png, 2 x 1 pixels"
+check "it is not beside the scene" cmp -s skin.png image/image.png
+check "the scene does not name it" has image/scene.json '"image":.*"image.png"'
+run plan image/scene.json
+check "the scene is not read again: $code" code_is 0
+run prepare image.obj -o image2 --no-tetgen --units mm --no-image
+check "an image is written that was not wanted" test ! -e image2/image2.png -a "$(grep -c '"image":' image2/scene.json)" -eq 0
+printf 'GIF89a' >skin.png
+run prepare image.obj -o image3 --no-tetgen --units mm
+refused 1 "skin.png: byte 0: neither a PNG nor a JPEG image"
+check "a folder is left" test ! -e image3
+printf 'newmtl skin\nmap_Kd ../skin.png\n' >box.mtl
+run prepare image.obj -o image3 --no-tetgen --units mm
+refused 1 "box.mtl: line 2: map_Kd: '../skin.png' is not the plain name of a file: put the image beside the OBJ file"
+sed -i 's/"mesh":.*/"mesh": "image2.palmesh",/' image/scene.json
+cp image2/image.palmesh image/image2.palmesh
+run plan image/scene.json
+refused 1 "scene.json: bodies\[0\].image: the surface has no image coordinates"
+end
+
 begin "prepare keeps where the axes point in the patient, and refuses what cannot be"
 run prepare box.obj -o axes --no-tetgen --units mm --axes LSA
 check "exit code $code" code_is 0

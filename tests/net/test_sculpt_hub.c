@@ -3,6 +3,8 @@
 #include "tests/net/command_room.h"
 #include "tests/session/sculpt_body.h"
 
+#include <cjson/cJSON.h>
+
 static clay_scene clay;
 
 /* places of a block of 0.1 m, on its top and beside it */
@@ -82,6 +84,43 @@ static void assets_that_have_been_replaced_can_still_be_fetched(void)
     pal_mem_get(transport, first, &reply);
     CHECK_INT(reply.status, 404);
     pal_packet_drop(reply.body);
+    mem_end(&c);
+    end();
+}
+
+/* the file that says what a click picks: its faces are those that commands name, its triangles those of the asset */
+static void the_control_cells_say_what_is_picked(void)
+{
+    mem_client c;
+    pal_reply reply;
+    begin();
+    join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    pal_mem_get(transport, part(&c)->control_cells, &reply);
+    REQUIRE(reply.status == 200);
+    cJSON *root = cJSON_ParseWithLength((const char *)reply.body->bytes, reply.body->n_byte);
+    pal_packet_drop(reply.body);
+    CHECK_INT(cJSON_GetArraySize(cJSON_GetObjectItem(root, "vertices_m")), 3 * clay.cells.n_vertex);
+    const cJSON *faces = cJSON_GetObjectItem(root, "faces"), *runs = cJSON_GetObjectItem(root, "triangles"), *face;
+    CHECK_INT(cJSON_GetArraySize(faces), clay.cells.n_boundary_face);
+    double n_tri = 0;
+    for (const cJSON *run = runs->child; run; run = run->next->next) n_tri += run->next->valuedouble;
+    CHECK_NEAR(n_tri, part(&c)->n_triangle, 0);
+    CHECK(order(&c, "probe", TOP));
+    cJSON_ArrayForEach(face, faces)
+    {
+        const cJSON *edges = cJSON_GetObjectItem(face, "edges"), *edge;
+        if (cJSON_GetObjectItem(face, "face")->valuedouble != reported(&c, "face")) continue;
+        CHECK_NEAR(cJSON_GetObjectItem(face, "cell")->valuedouble, reported(&c, "cell"), 0);
+        bool found = false;
+        cJSON_ArrayForEach(edge, edges) found = found || edge->valuedouble == reported(&c, "edge");
+        CHECK(found);
+        n_tri = -1;
+    }
+    CHECK_NEAR(n_tri, -1, 0); /* the face of the probe is in the list */
+    const double picked = reported(&c, "cell");
+    CHECK(order(&c, "delete", TOP));
+    CHECK_NEAR(reported(&c, "cell"), picked, 0);
+    cJSON_Delete(root);
     mem_end(&c);
     end();
 }
@@ -398,6 +437,7 @@ int main(void)
     clay_make(&clay, 2, 0.1);
     RUN(a_cell_grows_and_the_frames_are_of_the_new_epoch);
     RUN_SERIAL(assets_that_have_been_replaced_can_still_be_fetched);
+    RUN(the_control_cells_say_what_is_picked);
     RUN(paint_is_what_a_probe_finds);
     RUN(a_material_that_was_refused_does_not_stick);
     RUN(a_cut_shows_the_inside_and_goes_again);

@@ -338,7 +338,10 @@ static inline void golden_line(int line, pal_control *c)
         c->status.active[1] = (pal_wire_active){3, 188, 558, 746, 2232};
     }
     if (line == PAL_CONTROL_COUNT + 3) c->join.topology_deltas = true;
-    if (line == PAL_CONTROL_COUNT + 4) c->hello.part[0].is_sculptable = true;
+    if (line == PAL_CONTROL_COUNT + 4) {
+        c->hello.part[0].is_sculptable = true;
+        snprintf(c->hello.part[0].control_cells, PAL_WIRE_NAME_BYTES, "/asset/00112233445566778899aabbccddeeff");
+    }
     if (line == PAL_CONTROL_COUNT + 5) {
         c->hello.estimates = true;
         golden_rows(3, &c->hello.plan.n_part, c->hello.plan.part, &c->hello.plan.n_reason, c->hello.plan.reason);

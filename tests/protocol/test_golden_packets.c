@@ -256,6 +256,7 @@ static void control_lines_are_read_and_written_as_committed(void)
         if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.part[1].is_adaptive, at == PAL_CONTROL_COUNT + 1);
         if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.part[0].is_sculptable, at == PAL_CONTROL_COUNT + 4);
         if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.part[0].colour[0] == '#', at == PAL_CONTROL_COUNT + 10);
+        if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.part[0].control_cells[0] != 0, at == PAL_CONTROL_COUNT + 4);
         if (kind == PAL_CONTROL_STATUS) CHECK_INT(c.status.n_active, at == PAL_CONTROL_COUNT + 2 ? 2 : 0);
         if (kind == PAL_CONTROL_JOIN) CHECK_INT(c.join.topology_deltas, at == PAL_CONTROL_COUNT + 3);
         if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.estimates, at == PAL_CONTROL_COUNT + 5);

@@ -27,6 +27,8 @@ export class AppState {
     target = null;
     /** @type {Map<number, import("./body_mesh.js").BodyMesh>} shown body of each part */
     bodies = new Map();
+    /** @type {Map<number, import("./body_mesh.js").BodyMesh>} of a newer topology, until its first frame */
+    pendingBodies = new Map();
     field = "none"; // shown in colour
     /** @type {{low: number, high: number} | null} of the colours; null: no values yet */
     range = null;
@@ -35,6 +37,11 @@ export class AppState {
 
     get parts() {
         return this.hello?.parts ?? [];
+    }
+
+    /** body of the newest topology of each part, also where its first frame has not come */
+    get newestBodies() {
+        return new Map([...this.bodies, ...this.pendingBodies]);
     }
 
     /** state of the own tool, as the server sent it last */
@@ -54,6 +61,9 @@ export class AppState {
     }
 
     countVertices() {
-        this.figures.vertices = [...this.bodies.values()].reduce((n, body) => n + body.nVisible(), 0);
+        this.figures.vertices = [...this.bodies.values()].reduce(
+            (n, body) => n + body.nVisible() - body.copies.length,
+            0,
+        );
     }
 }

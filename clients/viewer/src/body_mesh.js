@@ -1,5 +1,6 @@
 // One shown part: the geometry of decoded frames, the triangles of a part that adapts, its edges. Only vertices of the
 // triangles shown have meaningful positions.
+import { withoutCopies } from "./creases.js";
 import { FieldColours } from "./field_colours.js";
 import { vertexNormals } from "./normals.js";
 import { pickTriangle } from "./picking.js";
@@ -44,11 +45,13 @@ export class BodyMesh {
      * @param {Float32Array} rest [n][3] @param {Uint32Array} triangles [m][3]
      * @param {Uint32Array | null} visible the vertices in the triangles, null: all
      * @param {import("./tissue_looks.js").Look} look
+     * @param {Uint32Array} copies vertices of which the last ones are copies, at creases
      */
-    constructor(scene, rest, triangles, visible, look) {
+    constructor(scene, rest, triangles, visible, look, copies) {
         this.scene = scene;
         this.rest = rest;
         this.visible = visible;
+        this.copies = copies;
         this.epoch = 0; // of its asset
         this.shown = false; // a frame has been taken: there are normals, without which it is black
         this.wanted = true;
@@ -63,7 +66,7 @@ export class BodyMesh {
         this.takeTriangles(triangles);
         this.mesh = new THREE.Mesh(this.geometry, makeTissue(this.colours.uniforms, look));
         this.colours.material = this.mesh.material;
-        this.closed = isClosed(rest, triangles);
+        this.closed = isClosed(rest, this.triangles());
         if (look.vessels.amount > 0) {
             this.restNormal = new THREE.BufferAttribute(new Float32Array(rest.length), 3);
             this.geometry.setAttribute("restNormal", this.restNormal);
@@ -169,10 +172,16 @@ export class BodyMesh {
         if (this.lines && !on) this.lines.visible = false;
     }
 
+    /** corners of the triangles in use, of the vertices without copies: those of a closed surface are joined */
+    triangles() {
+        const index = /** @type {THREE.BufferAttribute} */ (this.geometry.index);
+        const drawn = /** @type {Uint32Array} */ (index.array).subarray(0, this.nCorner);
+        return withoutCopies(drawn, this.copies, this.rest.length / 3);
+    }
+
     /** the surface as drawn, for a file @returns {import("./exporters.js").Surface} */
     surface() {
-        const index = /** @type {THREE.BufferAttribute} */ (this.geometry.index);
-        return { positions: this.position.array, triangles: index.array.subarray(0, this.nCorner) };
+        return { positions: this.position.array, triangles: this.triangles() };
     }
 
     /** draws the edges of the triangles @param {boolean} on */
@@ -209,8 +218,7 @@ export class BodyMesh {
 
     /** @param {THREE.Ray} ray @returns {import("./picking.js").Hit | null} */
     pick(ray) {
-        const index = /** @type {THREE.BufferAttribute} */ (this.geometry.index);
-        return pickTriangle(ray, this.position.array, index.array, this.nCorner);
+        return pickTriangle(ray, this.position.array, this.triangles(), this.nCorner);
     }
 
     dispose() {

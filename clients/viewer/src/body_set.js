@@ -18,8 +18,7 @@ export class BodySet {
         this.state = state;
         this.stage = stage;
         this.giveBack = giveBack;
-        /** @type {Map<number, BodyMesh>} of a new topology, until its first frame */
-        this.pending = new Map();
+        this.pending = state.pendingBodies;
         /** @type {BodyMesh[]} replaced, until the next picture: what they share with the renderer is kept */
         this.retired = [];
         /** @type {Map<number, FrameArrays & {shown: import("./topology_delta.js").Shown | null}>} newest frame of each part
@@ -41,11 +40,11 @@ export class BodySet {
     }
 
     /** @param {Extract<import("./link.js").PageMessage, {type: "part"}>} message */
-    takePart({ part, epoch, rest, uv, triangles, visible }) {
+    takePart({ part, epoch, rest, uv, copies, triangles, visible }) {
         this.pending.get(part)?.dispose();
         this.frames.delete(part); // of the older topology
         const { appearance, colour, image } = this.state.parts[part] ?? {};
-        const body = new BodyMesh(this.stage.scene, rest, triangles, visible, lookOf(appearance, colour));
+        const body = new BodyMesh(this.stage.scene, rest, triangles, visible, lookOf(appearance, colour), copies);
         if (uv && image) showImage(body, uv, image, this.stage);
         const waits = this.state.bodies.has(part);
         body.epoch = epoch;
@@ -67,6 +66,7 @@ export class BodySet {
         const former = this.state.bodies.get(part);
         if (former) {
             former.appear(false);
+            body.colours.adopt(former.colours, performance.now());
             this.retired.push(former);
         }
         body.appear(true);
@@ -104,12 +104,12 @@ export class BodySet {
         for (const body of this.retired.splice(0)) body.dispose();
     }
 
-    /** nearest hit of a ray @param {import("./three.js").Ray} ray @returns {import("./picking.js").Hit | null} */
+    /** nearest hit of a ray @param {import("./three.js").Ray} ray @returns {(import("./picking.js").Hit & {part: number}) | null} */
     pick(ray) {
         let nearest = null;
-        for (const body of this.state.bodies.values()) {
+        for (const [part, body] of this.state.bodies) {
             const hit = body.pick(ray);
-            if (hit && (!nearest || hit.distance < nearest.distance)) nearest = hit;
+            if (hit && (!nearest || hit.distance < nearest.distance)) nearest = { ...hit, part };
         }
         return nearest;
     }

@@ -19,6 +19,7 @@ const part = /** @type {const} */ ({
     "sculptable?": "bool",
     "appearance?": "text",
     "colour?": "text",
+    "control_cells?": "text",
 });
 
 const member = /** @type {const} */ ({

@@ -16,6 +16,7 @@ const ROLL_RAD = Math.PI / 12; // turn of the instrument for a key press
  *   inside: import("./inside.js").Inside,
  *   accuracy: import("./accuracy_panel.js").AccuracyPanel, plots: import("./plots.js").Plots,
  *   sculpt: import("./sculpt_panel.js").SculptPanel,
+ *   highlight: import("./sculpt_highlight.js").SculptHighlight,
  *   viewMenu: import("./view_menu.js").ViewMenu,
  *   send: (message: import("./control_table.js").ClientMessage) => void, showFigures: () => void
  * }} Page the parts of the page that the controls act on
@@ -113,6 +114,7 @@ export class Controls {
         input.mode = mode;
         input.release();
         htmlById("sculpt").hidden = mode !== "sculpt";
+        this.page.highlight.enable(mode === "sculpt");
         this.makeRoom(mode === "sculpt");
         if (mode === "sculpt") htmlById("hint").classList.add("gone");
         for (const name of ["pull", "press", "sculpt"]) markRadio(buttonById("mode-" + name), mode === name);

@@ -38,6 +38,22 @@ export class FieldColours {
         this.since = now;
     }
 
+    /**
+     * Values of the topology before, until its own arrive: the surface does not flash in its natural colour.
+     * @param {FieldColours} former @param {number} now ms
+     */
+    adopt(former, now) {
+        const { values, uniforms, newer } = former;
+        if (this.values || !values || newer.array.length !== this.newer.array.length) return;
+        const [low, high] = uniforms.newer.value.toArray();
+        this.take(/** @type {Uint8Array} */ (newer.array), low, high, now, null);
+        // as it was shown
+        this.uniforms.mix.value = uniforms.mix.value;
+        this.uniforms.range.value.copy(uniforms.range.value);
+        this.uniforms.stops.value.forEach((stop, i) => stop.copy(uniforms.stops.value[i]));
+        if (this.material) Object.assign(this.material, MATT);
+    }
+
     /** shows tissue, until values of another field arrive */
     drop() {
         this.values = null;

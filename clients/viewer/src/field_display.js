@@ -53,7 +53,7 @@ export class FieldDisplay {
         this.state.range = null;
         this.list.value = name;
         this.list.classList.toggle("chosen", name !== "none");
-        for (const body of this.state.bodies.values()) body.colours.drop();
+        for (const body of this.state.newestBodies.values()) body.colours.drop();
         this.subscribe();
         this.showLegend();
         this.inside?.showNote();
@@ -90,7 +90,7 @@ export class FieldDisplay {
 
     /** @param {Extract<import("./link.js").PageMessage, {type: "field"}>} message */
     takeField({ part, name, level, low, high }) {
-        const body = this.state.bodies.get(part);
+        const body = this.state.newestBodies.get(part);
         // values of a field that is no longer chosen may still arrive
         if (name !== this.state.field || !body || 3 * level.length !== body.rest.length) return;
         body.colours.take(level, low, high, performance.now(), body.visible);
@@ -100,7 +100,7 @@ export class FieldDisplay {
 
     /** the range of the colours covers the values of all parts */
     updateRange() {
-        const bodies = [...this.state.bodies.values()];
+        const bodies = [...this.state.newestBodies.values()];
         const values = bodies.flatMap((body) => body.colours.values ?? []);
         if (values.length === 0) return;
         values.push(...(this.inside?.ranges() ?? []));

@@ -1,5 +1,5 @@
 // The tool by keyboard: Enter puts it on the organ in the middle of the picture, arrows and Page Up and Down move it,
-// Enter or Escape lets go.
+// Enter or Escape lets go. While sculpting Enter points at the organ, and once more clicks.
 import * as THREE from "./three.js";
 
 const STEP = 0.01; // of the scene's size: way of the tool for one press of a key
@@ -61,12 +61,19 @@ export class KeyboardTool {
 
     begin() {
         const { input, stage } = this;
-        if (!input.enabled || input.drag || input.mode === "sculpt") return false;
+        const sculpts = input.mode === "sculpt";
+        if (!(input.enabled || sculpts) || input.drag) return false;
+        if (sculpts && input.mouse?.byKeyboard) return this.click(input.mouse);
         const { left, top } = stage.canvas.getBoundingClientRect();
         const box = stage.pane.box(stage.canvas);
         for (const { x, y } of pixelsFromMiddle(box.width, box.height)) {
-            const hit = input.hit({ clientX: left + box.x + x, clientY: top + box.y + y });
+            const at = { clientX: left + box.x + x, clientY: top + box.y + y };
+            const hit = input.hit(at);
             if (!hit) continue;
+            if (sculpts) {
+                input.hover(at, true);
+                return true;
+            }
             // a press begins outside
             if (input.mode === "press") hit.point.addScaledVector(hit.normal, input.radius);
             const hand = input.handAt(hit.point);
@@ -75,5 +82,13 @@ export class KeyboardTool {
             return true;
         }
         return false;
+    }
+
+    /** while sculpting Enter first shows what lies in the middle of the picture, then clicks it @param {{x: number, y: number}} at */
+    click({ x, y }) {
+        const hit = this.input.hit({ clientX: x, clientY: y });
+        if (hit) this.input.onClick(hit);
+        else this.input.hover(null);
+        return true;
     }
 }

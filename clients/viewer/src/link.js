@@ -3,6 +3,7 @@
 import { decodeAsset } from "./asset.js";
 import { CommandQueue } from "./command_queue.js";
 import { readControl } from "./control_reader.js";
+import { fillCopies, splitCreases } from "./creases.js";
 import { decodeField, readFieldHead } from "./field_decoder.js";
 import { InteriorLink } from "./interior_link.js";
 import { FrameDecoder, readFrameHead } from "./frame_decoder.js";
@@ -52,7 +53,8 @@ const FINAL = new Map([
  * Messages from the worker to the page.
  * @typedef {{type: "state", state: ConnectionState, text: string}
  *   | {type: "control", message: ServerMessage}
- *   | ({type: "part", part: number, epoch: number, rest: Float32Array, uv: Float32Array<ArrayBuffer> | null} & Shown)
+ *   | ({type: "part", part: number, epoch: number, rest: Float32Array, uv: Float32Array<ArrayBuffer> | null,
+ *       copies: Uint32Array} & Shown)
  *   | ({type: "frame", part: number, shown: Shown | null} & FrameArrays)
  *   | {type: "field", part: number, name: string, low: number, high: number, level: Uint8Array}
  *   | import("./interior_link.js").InteriorMesh | import("./interior_link.js").InteriorValues
@@ -78,8 +80,9 @@ const FINAL = new Map([
  *   later: (call: () => void, ms: number) => void,
  * }} Environment
  * @typedef {{decoder: FrameDecoder, table: Uint32Array, shown: Shown, changed: boolean, epoch: number, n: number,
- *   spare: FrameArrays[], copies: Uint32Array}} Part copies: of image_seams.js; table: of triangles, up to date; shown: of the table at the last frame; changed: the
- *   table has changed since
+ *   creases: Uint32Array, spare: FrameArrays[], copies: Uint32Array}} Part copies: of image_seams.js; table: of
+ *   triangles, up to date; shown: of the table at the last frame; changed: the table has changed since; n: vertices of
+ *   the asset; creases: vertices that creases add to them, copies of these
  */
 
 /** close reason: at most 123 bytes of ASCII @param {unknown} error */
@@ -319,7 +322,7 @@ export class Link {
         this.env.later(() => generation === this.generation && this.ping(), PING_MS);
     }
 
-    /** @param {number} index @param {{epoch: number, asset: string, interior?: string}} info */
+    /** @param {number} index @param {{epoch: number, asset: string, interior?: string, sculptable?: boolean}} info */
     async loadPart(index, info) {
         if (this.options.toolOnly) return;
         this.interiors.offer(index, info, this.options.url.replace(/^ws/, "http"));
@@ -334,7 +337,15 @@ export class Link {
             // only a readable asset resets the pause: a server with unreadable assets is asked ever more slowly
             this.tries = 0;
             const n = asset.rest.length / 3;
-            const shown = shownOf(asset.triangles, n);
+            // cuts have sharp edges
+            const { triangles, copies: creases } =
+                info.sculptable && !asset.uv
+                    ? splitCreases(asset.rest, asset.triangles)
+                    : { triangles: asset.triangles, copies: NONE };
+            const shown = shownOf(triangles, n + creases.length);
+            const rest = new Float32Array(3 * (n + creases.length));
+            rest.set(asset.rest);
+            fillCopies(rest, creases, 3);
             this.parts.set(index, {
                 decoder: new FrameDecoder(asset),
                 table: asset.triangles,
@@ -342,11 +353,12 @@ export class Link {
                 changed: false,
                 epoch: info.epoch,
                 n,
+                creases,
                 spare: [],
                 copies: asset.uv ? findCopies(asset.rest) : NONE,
             });
-            const { rest, uv } = asset;
-            this.env.post({ type: "part", part: index, epoch: info.epoch, rest: rest.slice(), uv, ...shown });
+            const { uv } = asset;
+            this.env.post({ type: "part", part: index, epoch: info.epoch, rest, uv, copies: creases, ...shown });
             this.decodeEarly(index);
         } catch (error) {
             if (generation === this.generation && this.requested.get(index) === info.epoch)
@@ -376,8 +388,9 @@ export class Link {
             return;
         }
         if (epoch < part.epoch) return;
-        const level = new Uint8Array(part.n);
-        const head = decodeField(bytes, level);
+        const level = new Uint8Array(part.n + part.creases.length);
+        const head = decodeField(bytes, level.subarray(0, part.n));
+        fillCopies(level, part.creases, 1);
         this.env.post({ type: "field", part: index, name: head.name, low: head.low, high: head.high, level }, [
             level.buffer,
         ]);
@@ -415,11 +428,13 @@ export class Link {
         }
         if (epoch < part.epoch) return;
         const begin = this.env.now();
+        const size = 3 * (part.n + part.creases.length);
         const { positions, normals } = part.spare.pop() ?? {
-            positions: new Float32Array(3 * part.n),
-            normals: new Float32Array(3 * part.n),
+            positions: new Float32Array(size),
+            normals: new Float32Array(size),
         };
-        part.decoder.decode(bytes, positions);
+        part.decoder.decode(bytes, positions.subarray(0, 3 * part.n));
+        fillCopies(positions, part.creases, 3);
         joinPositions(part.copies, positions);
         const ms = this.env.now() - begin;
         const shown = part.changed ? shownOf(part.table, part.n) : null;
@@ -436,7 +451,7 @@ export class Link {
     /** arrays returned by the page @param {{part: number} & FrameArrays} old */
     reuse(old) {
         const part = this.parts.get(old.part);
-        if (part && part.spare.length < SPARE_MAX && old.positions.length === 3 * part.n)
+        if (part && part.spare.length < SPARE_MAX && old.positions.length === 3 * (part.n + part.creases.length))
             part.spare.push({ positions: old.positions, normals: old.normals });
     }
 

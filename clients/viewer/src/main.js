@@ -19,11 +19,13 @@ import { Messages } from "./messages.js";
 import { OrientationCube } from "./orientation.js";
 import { OtherTools } from "./other_tools.js";
 import { pressDepth, withOwnTool } from "./own_tool.js";
+import { materialField, PaintColours } from "./paint_colours.js";
 import { PlanPanel } from "./plan_panel.js";
 import { PlaybackBar } from "./playback_bar.js";
 import { Plots } from "./plots.js";
 import { PoseSender } from "./pose_sender.js";
 import { showScale } from "./scale_bar.js";
+import { SculptHighlight } from "./sculpt_highlight.js";
 import { SculptPanel } from "./sculpt_panel.js";
 import { Stage } from "./stage.js";
 import { store, stored } from "./storage.js";
@@ -80,7 +82,15 @@ const input = new ToolInput(
     },
     (tip) => marks.hand(state.ownTool, tip),
 );
-input.onClick = (/** @type {number[]} */ position) => sculpt.click(position);
+const highlight = new SculptHighlight(stage, state, sculpt);
+const colours = new PaintColours(state, fields);
+sculpt.onChange = () => {
+    highlight.refresh();
+    colours.show(highlight.on ? materialField(sculpt.tool, sculpt.paint()) : null);
+};
+sculpt.nameOf = (/** @type {number} */ part) => state.parts[part]?.name ?? "";
+input.onClick = (/** @type {import("./tool_input.js").Hit} */ hit) => sculpt.click(hit);
+input.onHover = (/** @type {import("./tool_input.js").Hit | null} */ hit) => highlight.hover(hit);
 input.onFirstDrag = () => htmlById("hint").classList.add("gone");
 const views = new ViewModes(
     stage,
@@ -95,9 +105,9 @@ viewMenu.offerHeadset(() => {
     return { state, stage, poses: ownPoses, second, picture };
 });
 const showFigures = () => messages.showFigures();
-const tools = { accuracy, plots, sculpt, inside, viewMenu };
+const tools = { accuracy, plots, sculpt, highlight, inside, viewMenu };
 const controls = new Controls({ state, stage, layout, input, fields, ...tools, send, showFigures });
-const panels = { panel, members, accuracy, plots, sculpt, playback, others, controls };
+const panels = { panel, members, accuracy, plots, sculpt, highlight, playback, others, controls };
 const messages = new Messages({ state, stage, layout, bodies, fields, inside, input, marks, send, ...panels });
 worker.onmessage = (/** @type {MessageEvent<import("./link.js").PageMessage>} */ { data }) => messages.take(data);
 
@@ -126,7 +136,7 @@ function showForce() {
 }
 
 let nDrawn = 0;
-let toldSlow = false; // that this browser draws slowly: once
+let slowIsKnown = false; // that this browser draws slowly: once
 let countedAt = performance.now();
 function draw() {
     requestAnimationFrame(draw);
@@ -162,6 +172,7 @@ function picture() {
                 MARK_RADIUS * stage.size,
                 now,
             );
+            highlight.update();
             stage.draw();
             bodies.disposeRetired();
             marks.placeLabels();
@@ -173,8 +184,8 @@ function picture() {
     }
     if (now - countedAt > 1000) {
         state.figures.fps = (1000 * nDrawn) / (now - countedAt);
-        if (stage.pace.struggles && !toldSlow) {
-            toldSlow = true;
+        if (stage.pace.struggles && !slowIsKnown) {
+            slowIsKnown = true;
             layout.notice(
                 text("notice.slow_browser", { n: Math.max(1, Math.round(state.figures.fps)) }),
                 SLOW_NOTICE_MS,
@@ -206,7 +217,7 @@ inputById("name").onchange = () => {
     connect();
 };
 // read-only access for tests and for the console
-const shown = { state, stage, input, marks, accuracy, plots, capture, cue, views, inside };
+const shown = { state, stage, input, marks, accuracy, plots, capture, cue, views, sculpt, highlight, inside };
 Object.defineProperty(window, "palpate", { value: shown });
 connect();
 draw();

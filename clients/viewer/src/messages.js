@@ -19,6 +19,7 @@ import { sameTools } from "./tool_marks.js";
  *   panel: import("./plan_panel.js").PlanPanel, members: import("./members_panel.js").MembersPanel,
  *   accuracy: import("./accuracy_panel.js").AccuracyPanel, plots: import("./plots.js").Plots,
  *   sculpt: import("./sculpt_panel.js").SculptPanel, playback: import("./playback_bar.js").PlaybackBar,
+ *   highlight: import("./sculpt_highlight.js").SculptHighlight,
  *   others: import("./other_tools.js").OtherTools, controls: import("./controls.js").Controls,
  *   send: (message: import("./control_table.js").ClientMessage) => void
  * }} Page the parts of the page that messages act on
@@ -139,6 +140,7 @@ export class Messages {
         accuracy.begin(message.parts, message.estimates === true, 1000 / message.step_rate_hz);
         buttonById("accuracy-toggle").hidden = !message.estimates;
         sculpt.begin(message.box_min_m, message.box_max_m);
+        this.page.highlight.begin();
         controls.offerSculpting();
         fields.offer(true);
         this.showTitle();
@@ -158,6 +160,7 @@ export class Messages {
             this.showTitle();
         }
         sculpt.changed();
+        void this.page.highlight.load();
         bodies.truncate(message.parts.length);
         controls.offerSculpting();
         fields.offer(false);

@@ -1,5 +1,7 @@
 // Commands of sculpting from the settings of the panel and the clicked points; the plane of a cut; answers in words. Pure.
+import { isTextKey, text } from "./text.js";
 
+/** @typedef {import("./text.js").TextKey} TextKey */
 /**
  * @typedef {{distance_m: number, scale: number, radius_m: number, paint: string, sharpness: number, entity: number,
  *            pressure_Pa: number, lift_m: number, stiffness_N_m: number, middle: number[]}} Settings
@@ -7,38 +9,35 @@
  * @typedef {{low: number[], high: number[]}} Box
  */
 
-/** @type {Record<string, {title: string, points: number, hints: string[]}>} points: clicks that the tool needs, with a hint before each */
+/** @type {Record<string, {points: number, key: string}>} points: clicks that the tool needs; key: chooses it */
 export const TOOLS = Object.freeze({
-    extrude: { title: "Extrude", points: 1, hints: ["Click a face to extrude a cell from it."] },
-    delete: { title: "Delete", points: 1, hints: ["Click a cell to delete it."] },
-    divide: { title: "Divide", points: 1, hints: ["Click a cell to divide it."] },
-    merge: { title: "Merge", points: 2, hints: ["Click the first of two faces to merge.", "Click the second face."] },
-    bridge: {
-        title: "Bridge",
-        points: 2,
-        hints: ["Click the first of two faces to join by a cell.", "Click the second face."],
-    },
-    sharpen: { title: "Sharpen", points: 1, hints: ["Click near the edge, vertex or face."] },
-    paint: { title: "Paint", points: 1, hints: ["Click the place to paint."] },
-    inflate: { title: "Inflate", points: 1, hints: ["Click the place to inflate."] },
-    deflate: { title: "Deflate", points: 1, hints: ["Click the place to deflate."] },
-    curve: {
-        title: "Curve",
-        points: 2,
-        hints: ["Click one end of the curve.", "Click the other end. The middle of the curve is pulled."],
-    },
-    probe: { title: "Probe", points: 1, hints: ["Click the place whose material to show."] },
+    extrude: { points: 1, key: "E" },
+    delete: { points: 1, key: "X" },
+    divide: { points: 1, key: "D" },
+    merge: { points: 2, key: "J" },
+    bridge: { points: 2, key: "B" },
+    sharpen: { points: 1, key: "S" },
+    paint: { points: 1, key: "T" },
+    inflate: { points: 1, key: "I" },
+    deflate: { points: 1, key: "O" },
+    curve: { points: 2, key: "U" },
+    probe: { points: 1, key: "Q" },
 });
+
+/** what to do before each click of a tool @param {string} tool of TOOLS @param {number} clicks so far */
+export const hintOf = (tool, clicks) => text(/** @type {TextKey} */ (`sculpt.hint.${tool}.${clicks}`));
+
+const CUT_MARGIN = 0.04; // of the box: the outline of a cut stands out by so much
 
 /** tools that are forces: they act until they are released, and follow their slider */
 export const FORCES = Object.freeze(["inflate", "deflate", "curve"]);
 
-/** @type {Record<string, {title: string, young_factor: number, density_factor: number}>} factors of one stroke of the brush */
+/** @type {Record<string, {young_factor: number, density_factor: number}>} factors of one stroke of the brush */
 export const PAINTS = Object.freeze({
-    stiffer: { title: "Stiffer", young_factor: 2, density_factor: 1 },
-    softer: { title: "Softer", young_factor: 0.5, density_factor: 1 },
-    heavier: { title: "Heavier", young_factor: 1, density_factor: 1.5 },
-    lighter: { title: "Lighter", young_factor: 1, density_factor: 1 / 1.5 },
+    stiffer: { young_factor: 2, density_factor: 1 },
+    softer: { young_factor: 0.5, density_factor: 1 },
+    heavier: { young_factor: 1, density_factor: 1.5 },
+    lighter: { young_factor: 1, density_factor: 1 / 1.5 },
 });
 
 /**
@@ -95,6 +94,24 @@ export function cutCommand(axis, share, box) {
     return { verb: "cut", args };
 }
 
+/**
+ * Outline of the plane of a cut, a little larger than the box: pairs of points.
+ * @param {"none" | "x" | "y" | "z"} axis @param {number} share 0..1 @param {Box} box @returns {number[][]}
+ */
+export function cutOutline(axis, share, box) {
+    const k = ["x", "y", "z"].indexOf(axis);
+    if (k < 0) return [];
+    const { low, high } = box;
+    const corner = (/** @type {number} */ p, /** @type {number} */ q) => {
+        const end = [0, 0, 0];
+        [end[k], end[(k + 1) % 3], end[(k + 2) % 3]] = [share, p, q];
+        return low.map((v, c) => v + end[c] * (high[c] - v));
+    };
+    const [near, far] = [-CUT_MARGIN, 1 + CUT_MARGIN];
+    const corners = [corner(near, near), corner(far, near), corner(far, far), corner(near, far)];
+    return corners.flatMap((point, i) => [point, corners[(i + 1) % 4]]);
+}
+
 /** box around a box and points @param {Box} box @param {Float32Array} x [n][3] @returns {Box} */
 export function boxAround(box, x) {
     const low = [...box.low];
@@ -112,11 +129,11 @@ function pressureText(pascal) {
     return `${Number((pascal / Number(size)).toPrecision(3))} ${unit}`;
 }
 
-/** result of a command in short @param {import("./control_table.js").Answer} answer */
-export function answerText({ verb, text, args = {} }) {
-    if (verb === "probe" && args.young_Pa !== undefined)
-        return `${pressureText(args.young_Pa)}, ${Number(args.density_kg_m3.toPrecision(3))} kg/m³`;
-    if (args.cells === undefined) return text;
-    const title = TOOLS[verb]?.title ?? verb[0].toUpperCase() + verb.slice(1);
-    return `${title}: ${args.cells} cells${args.prepare_ms === undefined ? "" : `, ${Math.round(args.prepare_ms)} ms`}`;
+/** result of a command in words @param {import("./control_table.js").Answer} answer */
+export function answerText({ verb, text: sentence, args = {} }) {
+    const key = `sculpt.done.${verb}`;
+    if (!isTextKey(key)) return sentence;
+    if (verb !== "probe") return text(key);
+    const density = String(Number(args.density_kg_m3.toPrecision(3)));
+    return text(key, { stiffness: pressureText(args.young_Pa), density });
 }

@@ -103,6 +103,7 @@ export class Stage {
         this.immersive = null;
         this.left = this.right = this.bottom = 0; // margins that panels cover, pixels
         this.dirty = true;
+        this.pictures = 0; // drawn so far
         const ratio = Math.min(window.devicePixelRatio || 1, 2);
         this.pace = new Pace(RATIO_MIN / ratio, software ? 0.6 / ratio : 1);
         this.effects = makeEffects(this, software, new URLSearchParams(location.search).get("effects"));
@@ -289,6 +290,7 @@ export class Stage {
     draw() {
         if (!this.dirty) return;
         this.dirty = false;
+        this.pictures++;
         if (this.immersive) return this.immersive.draw();
         this.applySize();
         this.placeCameras();

@@ -105,11 +105,12 @@ vec3 tissueVessel(vec3 surface) {
 }
 #endif`;
 
+// an image of the body's own has its colours already
 const COLOUR = `
-#ifdef TISSUE_PATTERNS
+#if defined(TISSUE_PATTERNS) && !defined(USE_MAP)
 diffuseColor.rgb = tissueColour(diffuseColor.rgb);
 #endif
-#ifdef TISSUE_VESSELS
+#if defined(TISSUE_VESSELS) && !defined(USE_MAP)
 diffuseColor.rgb = tissueVessel(diffuseColor.rgb);
 #endif
 #ifdef DOUBLE_SIDED

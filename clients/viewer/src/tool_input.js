@@ -7,13 +7,16 @@ import * as THREE from "./three.js";
  * @typedef {{position: number[], grasp: boolean, hand?: import("./instrument_pose.js").Hand | null} | null} ToolTarget
  */
 
+/** @typedef {import("./picking.js").Hit & {part: number}} Hit */
+
+const HOVER_MS = 66; // between two looks at what is under the mouse
 const CLICK_PX = 6; // a longer motion is not a click but turns the view
 const PRESS_S = 0.35; // duration in which a press reaches its depth
 
 export class ToolInput {
     /**
      * @param {import("./stage.js").Stage} stage
-     * @param {(ray: THREE.Ray) => import("./picking.js").Hit | null} pick
+     * @param {(ray: THREE.Ray) => Hit | null} pick
      * @param {(target: ToolTarget) => void} onTarget called on every change
      * @param {(tip: THREE.Vector3) => import("./instrument_pose.js").Hand | null} handAt the hand of the own tool
      */
@@ -24,9 +27,14 @@ export class ToolInput {
         this.handAt = handAt;
         /** @type {import("./controls.js").Mode} */
         this.mode = "pull";
-        /** @type {(position: number[]) => void} called with the point that is clicked while sculpting, m */
+        /** @type {(hit: Hit) => void} called with the place that is clicked while sculpting */
         this.onClick = () => {};
-        /** @type {{id: number, at: number[], x: number, y: number} | null} point where the button went down */
+        /** @type {(hit: Hit | null) => void} called with the place under the mouse while sculpting */
+        this.onHover = () => {};
+        /** @type {{x: number, y: number, at: number, picture: number, byKeyboard: boolean} | null} mouse over the picture, or
+         * where the keyboard points; at, picture: time in ms and number of the picture of the last look, -1: moved since */
+        this.mouse = null;
+        /** @type {{id: number, at: Hit, x: number, y: number} | null} place where the button went down */
         this.clickStart = null;
         this.enabled = false;
         this.radius = 0.01;
@@ -43,6 +51,7 @@ export class ToolInput {
         c.addEventListener("pointerup", (e) => this.up(e));
         c.addEventListener("pointercancel", (e) => this.up(e));
         c.addEventListener("lostpointercapture", (e) => this.up(e));
+        c.addEventListener("pointerleave", () => this.hover(null));
         c.addEventListener("contextmenu", (e) => e.preventDefault());
         c.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
         c.addEventListener("dblclick", (e) => {
@@ -71,7 +80,8 @@ export class ToolInput {
         this.clickStart = null;
         if (this.mode === "sculpt") {
             const at = e.button === 0 ? this.hit(e) : null;
-            if (at) this.clickStart = { id: e.pointerId, at: at.point.toArray(), x: e.clientX, y: e.clientY };
+            if (at) this.clickStart = { id: e.pointerId, at, x: e.clientX, y: e.clientY };
+            this.onHover(at);
             c.classList.add("busy");
             return;
         }
@@ -103,8 +113,7 @@ export class ToolInput {
         const last = this.pointers.get(e.pointerId);
         if (!last) {
             this.stage.choose(e);
-            if (e.pointerType === "mouse")
-                this.stage.canvas.classList.toggle("over", (this.enabled || this.mode === "sculpt") && this.hover(e));
+            if (e.pointerType === "mouse") this.hover(e);
             return;
         }
         const dx = e.clientX - last.x;
@@ -129,14 +138,23 @@ export class ToolInput {
         last.y = e.clientY;
     }
 
-    /** is the mouse over the organ? Checked at most 15 times a second @param {PointerEvent} e */
-    hover(e) {
+    /** the mouse moves over the picture; null: it has left @param {{clientX: number, clientY: number} | null} e @param {boolean} byKeyboard */
+    hover(e, byKeyboard = false) {
+        this.mouse = e && { x: e.clientX, y: e.clientY, at: this.mouse?.at ?? -Infinity, picture: -1, byKeyboard };
+        if (!e && this.pointers.size === 0) this.onHover(null);
+    }
+
+    /** what is under the mouse? While sculpting also when the picture has changed */
+    look() {
+        const { mouse, stage } = this;
         const now = performance.now();
-        if (now - (this.hoverAt ?? 0) > 66) {
-            this.hoverAt = now;
-            this.hoverWas = !!this.hit(e);
-        }
-        return !!this.hoverWas;
+        const sculpts = this.mode === "sculpt";
+        if (!mouse || this.pointers.size || now - mouse.at < HOVER_MS) return;
+        if (mouse.picture >= 0 && !(sculpts && stage.pictures > mouse.picture)) return;
+        Object.assign(mouse, { at: now, picture: stage.pictures });
+        const hit = this.enabled || sculpts ? this.hit({ clientX: mouse.x, clientY: mouse.y }) : null;
+        stage.canvas.classList.toggle("over", hit !== null);
+        if (sculpts) this.onHover(hit);
     }
 
     /** @param {PointerEvent} e */
@@ -189,7 +207,7 @@ export class ToolInput {
     /** updates the target; also called while the pointer rests, because a press deepens over time */
     tick() {
         const drag = this.drag;
-        if (!drag) return;
+        if (!drag) return this.look();
         const ray = this.stage.ray(drag.x, drag.y);
         const point = ray.intersectPlane(drag.plane, new THREE.Vector3());
         if (!point) return;

@@ -47,7 +47,7 @@ export class ViewMenu {
         htmlById("view-standard").append(
             ...STANDARD.map((from) => {
                 const button = makeButton(text(`views.standard.${from}`));
-                button.onclick = () => modes.goStandard(from, this.axes());
+                button.onclick = () => modes.goStandard(from, state.hello?.anatomical_axes ?? "");
                 return button;
             }),
         );
@@ -119,11 +119,6 @@ export class ViewMenu {
         hint.hidden = false;
         clearTimeout(this.hintTimer);
         this.hintTimer = window.setTimeout(() => (hint.hidden = true), HINT_MS);
-    }
-
-    /** of the patient, "" unknown @returns {string} */
-    axes() {
-        return /** @type {{anatomical_axes?: string}} */ (this.state.hello ?? {}).anatomical_axes ?? "";
     }
 
     get storage() {

@@ -156,17 +156,18 @@ test("keeps the newest field until its asset has come, drops one of an older epo
     s.sockets[0].receive(field);
     assert.equal(s.of("field").length, 0);
     // as if an asset of as many vertices had come
-    s.link.parts.set(head.part, { epoch: head.epoch, n });
+    s.link.parts.set(head.part, { epoch: head.epoch, n, creases: Uint32Array.from([7]) });
     s.sockets[0].receive(field);
     const [shown] = s.of("field");
-    assert.deepEqual([shown.part, shown.name, shown.level.length], [head.part, "von_mises", n]);
+    assert.deepEqual([shown.part, shown.name, shown.level.length], [head.part, "von_mises", n + 1]);
+    assert.equal(shown.level[n], shown.level[7]); // of a crease
     assert.ok(shown.low < shown.high);
-    s.link.parts.set(head.part, { epoch: head.epoch + 1, n });
+    s.link.parts.set(head.part, { epoch: head.epoch + 1, n, creases: Uint32Array.of() });
     s.sockets[0].receive(field);
     assert.equal(s.of("field").length, 1);
     assert.equal(s.sockets[0].closed, 0);
     // of another number of vertices: the server's mistake
-    s.link.parts.set(head.part, { epoch: head.epoch, n: n + 1 });
+    s.link.parts.set(head.part, { epoch: head.epoch, n: n + 1, creases: Uint32Array.of() });
     s.sockets[0].receive(field);
     assert.equal(s.sockets[0].closed, 4900);
 });

@@ -1,8 +1,21 @@
 // Commands of sculpting as the panel builds them, and surfaces as files.
 import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { joinSurfaces, toObj, toPly, toStl, WRITERS } from "../src/exporters.js";
-import { answerText, boxAround, commandOf, cutCommand, FORCES, liftOf, PAINTS, TOOLS } from "../src/sculpt_commands.js";
+import {
+    answerText,
+    boxAround,
+    commandOf,
+    cutCommand,
+    cutOutline,
+    FORCES,
+    liftOf,
+    PAINTS,
+    TOOLS,
+} from "../src/sculpt_commands.js";
+import { refusalText } from "../src/sculpt_refusals.js";
+import { isTextKey, text } from "../src/text.js";
 
 const SET = {
     distance_m: 0.02,
@@ -43,7 +56,7 @@ test("a click becomes a command with the point and the settings of the tool", ()
 test("a tool that joins two faces needs two clicks", () => {
     for (const tool of ["merge", "bridge"]) {
         assert.equal(commandOf(tool, SET, [[1, 2, 3]]), null);
-        assert.equal(TOOLS[tool].hints.length, 2);
+        assert.equal(TOOLS[tool].points, 2);
         assert.deepEqual(
             commandOf(tool, SET, [
                 [1, 2, 3],
@@ -91,7 +104,43 @@ test("a curve needs two ends and is pulled outward, perpendicular to itself", ()
         assert.ok((d[0] * 1.3 + d[1] * 1.4 + d[2] * 1.9) * lift > 0); // outward if lift > 0, else inward
     }
     assert.deepEqual(liftOf([0, 0, 0], [2, 0, 0], [1, 0, 0], 0.1), [0, 0, 0.1]); // through the middle: any direction
-    for (const tool of FORCES) assert.equal(TOOLS[tool].hints.length, TOOLS[tool].points);
+});
+
+test("every tool has a name, a tooltip with its key, a hint before each click, and a sentence after the last", () => {
+    const keys = Object.values(TOOLS).map(({ key }) => key);
+    assert.equal(new Set(keys).size, keys.length);
+    for (const key of keys) assert.ok(!"RPCM ".includes(key), `${key} is used by the page`);
+    for (const [tool, { points, key }] of Object.entries(TOOLS)) {
+        for (let i = 0; i < points; i++) assert.ok(isTextKey(`sculpt.hint.${tool}.${i}`), tool);
+        assert.ok(isTextKey(`sculpt.tool.${tool}`) && isTextKey(`sculpt.tool.tip.${tool}`), tool);
+        assert.match(text(/** @type {any} */ (`sculpt.tool.tip.${tool}`), { key }), new RegExp(`\\(${key}\\)$`));
+        const { verb } =
+            commandOf(
+                tool,
+                SET,
+                [
+                    [1, 2, 3],
+                    [4, 5, 6],
+                ].slice(0, points),
+            ) ?? {};
+        assert.ok(isTextKey(`sculpt.done.${verb}`), tool);
+    }
+    for (const paint of Object.keys(PAINTS)) assert.ok(isTextKey(`sculpt.paint.tip.${paint}`), paint);
+    for (const tool of FORCES) assert.ok(TOOLS[tool]);
+});
+
+test("every refusal of an edit has plain words", () => {
+    const read = (/** @type {string} */ name) =>
+        readFileSync(new URL(`../../../server/mesh/cells/${name}.c`, import.meta.url), "utf8");
+    const source = ["cell_edit_apply", "cell_edit_divide", "cell_edit_shapes", "cell_edit_work"].map(read).join("");
+    const sentences = [...source.matchAll(/pal_edit_refuse\(w, "([^"]+)"/g)].map((match) => match[1]);
+    assert.ok(sentences.length > 12);
+    // numbers that the panel cannot send
+    const never = /must be (0|1|above 0|within)|, there are %d|is given twice/;
+    for (const sentence of sentences.filter((s) => !never.test(s)))
+        assert.notEqual(refusalText(`edit: ${sentence}`), `edit: ${sentence}`);
+    assert.equal(refusalText("delete: nothing of chair is at 9 0 0 m"), "There is nothing to sculpt at this place.");
+    assert.equal(refusalText("something new"), "something new");
 });
 
 test("a stroke and its opposite restore the material", () => {
@@ -106,19 +155,22 @@ test("a cut is a plane within the box, perpendicular to its axis", () => {
     assert.deepEqual(cutCommand("y", 0.25, box), { verb: "cut", args: { nx: 0, ny: 1, nz: 0, offset_m: 1 } });
     assert.deepEqual(cutCommand("z", 1, box).args, { nx: 0, ny: 0, nz: 1, offset_m: 3 });
     assert.deepEqual(cutCommand("none", 0.5, box), { verb: "uncut", args: {} });
+    assert.deepEqual(cutOutline("none", 0.5, box), []);
+    const outline = cutOutline("y", 0.25, box);
+    assert.equal(outline.length, 8);
+    for (const [x, y, z] of outline) assert.ok(y === 1 && (x < -1 || x > 1) && (z < 2 || z > 3));
     assert.deepEqual(boxAround(box, Float32Array.of(-2, 1, 2.5, 0, 5, 2)), { low: [-2, 0, 2], high: [1, 5, 3] });
 });
 
-test("answers are displayed in short", () => {
+test("answers say in words what was done", () => {
+    const args = { cells: 9, can_undo: 1, can_redo: 0, prepare_ms: 12.6 };
+    assert.equal(answerText({ verb: "extrude", text: "extrude: 9 control cells", args }), "Extruded.");
+    assert.equal(answerText({ verb: "undo", text: "", args }), "Undone.");
+    assert.equal(answerText({ verb: "release", text: "release: tool 0" }), "Released.");
     assert.equal(
         answerText({ verb: "probe", text: "", args: { young_Pa: 15000, poisson: 0.4, density_kg_m3: 1234.56 } }),
-        "15 kPa, 1230 kg/m³",
+        "Stiffness 15 kPa, density 1230 kg/m³",
     );
-    assert.equal(
-        answerText({ verb: "extrude", text: "", args: { cells: 9, can_undo: 1, can_redo: 0, prepare_ms: 12.6 } }),
-        "Extrude: 9 cells, 13 ms",
-    );
-    assert.equal(answerText({ verb: "undo", text: "", args: { cells: 8 } }), "Undo: 8 cells");
     assert.equal(answerText({ verb: "other", text: "done", args: {} }), "done");
 });
 
