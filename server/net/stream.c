@@ -24,6 +24,15 @@ static pal_err refuse(pal_diagnostic *diag, int refusal, const char *part, const
                               part, what, pal_refusal_text(refusal));
 }
 
+static void drop_fields(pal_stream_part *part)
+{
+    for (int k = 0; k < PAL_FIELD_COUNT; k++) {
+        pal_packet_drop(part->field[k].packet);
+        pal_packet_drop(part->interior[k].packet);
+    }
+    pal_packet_drop(part->interior_asset);
+}
+
 /* makes a file of a part, which is named after its content; path: PAL_WIRE_NAME_BYTES */
 static pal_err make_file(const void *bytes, size_t n_byte, char *path, pal_packet **out)
 {
@@ -32,15 +41,6 @@ static pal_err make_file(const void *bytes, size_t n_byte, char *path, pal_packe
     pal_asset_hash(bytes, n_byte, hash);
     snprintf(path, PAL_WIRE_NAME_BYTES, "/asset/%s", hash);
     return *out ? PAL_ERR_OK : PAL_ERR_MEMORY;
-}
-
-static void drop_fields(pal_stream_part *part)
-{
-    for (int k = 0; k < PAL_FIELD_COUNT; k++) {
-        pal_packet_drop(part->field[k].packet);
-        pal_packet_drop(part->interior[k].packet);
-    }
-    pal_packet_drop(part->interior_asset);
 }
 
 /* Positions are sent as displacements, so that the order of nodes is any: their own. A tetrahedron a b c d is written
@@ -80,8 +80,8 @@ static pal_err open_interior(pal_stream_part *part, const pal_shown *shown, pal_
     if (refusal)
         return pal_diagnostic_set(diag, refusal == PAL_REFUSAL_MEMORY ? PAL_ERR_MEMORY : PAL_ERR_REFUSED,
                                   "part %s: no asset of its interior: %s", shown->name, pal_refusal_text(refusal));
-    pal_err err = make_file(bytes, n_byte, part->info.interior, &part->interior_asset);
     part->n_node = (uint32_t)shown->n_node;
+    const pal_err err = make_file(bytes, n_byte, part->info.interior, &part->interior_asset);
     free(bytes);
     return err;
 }

@@ -66,12 +66,12 @@ export class BodyMesh {
         this.takeTriangles(triangles);
         this.mesh = new THREE.Mesh(this.geometry, makeTissue(this.colours.uniforms, look));
         this.colours.material = this.mesh.material;
-        this.closed = isClosed(rest, this.triangles());
         if (look.vessels.amount > 0) {
             this.restNormal = new THREE.BufferAttribute(new Float32Array(rest.length), 3);
             this.geometry.setAttribute("restNormal", this.restNormal);
             this.updateRestNormals(triangles);
         }
+        this.closed = isClosed(rest, this.triangles());
         if (this.closed) this.mesh.material.side = THREE.FrontSide;
         this.mesh.frustumCulled = false;
         this.mesh.visible = false;
