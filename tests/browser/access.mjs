@@ -107,12 +107,19 @@ await run(async () => {
 
     // pages of other shapes
     for (const [name, width, height] of [
+        ["a narrow window", 900, 600],
         ["a telephone", 390, 844],
         ["a telephone on its side", 844, 390],
         ["a page at 200 %", 640, 360],
     ]) {
         await ada.setViewportSize({ width, height });
-        for (const id of ["panel-toggle", "accuracy-toggle", "plots-toggle"]) {
+        const outside = await ada.evaluate(() =>
+            [...document.querySelectorAll("#tools *")]
+                .map((e) => e.getBoundingClientRect())
+                .filter((r) => r.width && (r.left < 0 || r.right > innerWidth || r.bottom > innerHeight)),
+        );
+        check(`${name}: all buttons are on the page`, outside.length === 0, JSON.stringify(outside));
+        for (const id of ["panel-toggle", "accuracy-toggle", "plots-toggle", "inside-toggle"]) {
             await ada.click(`#${id}`);
             // loaded when they first open
             if (id === "plots-toggle") await ada.waitForSelector("#plots canvas");
@@ -121,8 +128,8 @@ await run(async () => {
             const px = await hidden(ada);
             check(`${name}: the organ is free beside what ${id} opens`, px <= 8, `${px} px hidden`);
             await ada.screenshot({ path: join(pictures, `access_${width}_${id}.png`) });
+            await ada.keyboard.press("Escape");
         }
-        await ada.keyboard.press("Escape");
     }
     const small = await ada.evaluate(() =>
         [...document.querySelectorAll("button, input, select, a")]

@@ -16,6 +16,20 @@ export class Layout {
     pending = false; // panels have moved while a drag held the organ in place
     noticeTimer = 0; // 0: the notice stays
 
+    constructor() {
+        // what stands above the buttons follows their rows
+        const tools = htmlById("tools");
+        const measure = () => {
+            const foot = Math.round(innerHeight - tools.getBoundingClientRect().top);
+            document.documentElement.style.setProperty("--foot", `${foot}px`);
+            this.place(this.pending);
+        };
+        const observer = new ResizeObserver(measure);
+        for (const element of [tools, ...[...LEFT, ...RIGHT, "inside"].map((id) => htmlById(id))])
+            observer.observe(element);
+        window.addEventListener("resize", measure);
+    }
+
     /**
      * The organ and its labels stand in what panels leave free: between them, or above them on a narrow page. During a
      * drag they stay where they are: the tool's target would move.
@@ -24,15 +38,18 @@ export class Layout {
     place(dragging) {
         this.pending = dragging;
         if (dragging) return;
-        const { left, right, bottom } = this.covered();
+        const { beside, left, right, bottom } = this.covered();
         const style = document.documentElement.style;
-        style.setProperty("--left", `${left}px`);
+        style.setProperty("--left", `${beside}px`);
         style.setProperty("--middle", `calc(50% + ${(left - right) / 2}px)`);
         style.setProperty("--free", `calc(100vw - ${left + right}px)`);
         this.stage?.setMargins(left, right, bottom);
     }
 
-    /** what panels cover at each side, pixels @returns {{left: number, right: number, bottom: number}} */
+    /**
+     * What panels cover at each side, pixels. Section planes stand to the right of another panel at the left.
+     * @returns {{beside: number, left: number, right: number, bottom: number}} beside: of left, without section planes
+     */
     covered() {
         const across = innerWidth <= NARROW && innerHeight > innerWidth; // as in panels.css
         const size = (/** @type {string} */ id) => {
@@ -40,7 +57,10 @@ export class Layout {
             return width && (across ? innerHeight - top : width + MARGIN);
         };
         const [left, right] = [Math.max(...LEFT.map(size)), Math.max(...RIGHT.map(size))];
-        return across ? { left: 0, right: 0, bottom: Math.max(left, right) } : { left, right, bottom: 0 };
+        const inside = size("inside");
+        return across
+            ? { beside: 0, left: 0, right: 0, bottom: Math.max(left, right, inside) }
+            : { beside: left, left: left + inside, right, bottom: 0 };
     }
 
     /** does the organ have room beside all panels? Else they are shown one at a time */
