@@ -41,7 +41,7 @@ typedef struct sheet {
 
 /* ---- colours ---- */
 
-/* the stops of clients/viewer/src/legend.js: viridis (Smith and van der Walt 2015) without its darkest eighth */
+/* the stops of clients/viewer/src/colour_maps.js: viridis (Smith and van der Walt 2015) without its darkest eighth */
 static const uint8_t stop[9][3] = {{0x47, 0x2e, 0x7c}, {0x3c, 0x4f, 0x8a}, {0x2f, 0x6b, 0x8d},
                                    {0x25, 0x86, 0x8d}, {0x25, 0xa0, 0x86}, {0x3d, 0xb9, 0x74},
                                    {0x73, 0xce, 0x55}, {0xb7, 0xdd, 0x2f}, {0xfd, 0xe7, 0x25}};

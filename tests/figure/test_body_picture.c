@@ -148,7 +148,7 @@ static void a_cube_shows_three_faces_from_a_corner_and_one_from_the_front(void)
     free(text);
 }
 
-/* what looks straight at the eye has the colour of its value itself; the stops are those of the viewer's legend */
+/* what looks straight at the eye has the colour of its value itself; the stops are those of the viewer */
 static void colours_are_those_of_the_viewer(void)
 {
     static const unsigned stop[9] = {0x472e7c, 0x3c4f8a, 0x2f6b8d, 0x25868d, 0x25a086,
@@ -158,12 +158,12 @@ static void colours_are_those_of_the_viewer(void)
         pal_body_picture_colour(i / 8.0, c);
         CHECK_INT((unsigned)c[0] << 16 | (unsigned)c[1] << 8 | c[2], stop[i]);
     }
-    FILE *legend = fopen("clients/viewer/src/legend.js", "rb");
-    REQUIRE(legend);
+    FILE *maps = fopen("clients/viewer/src/colour_maps.js", "rb");
+    REQUIRE(maps);
     char *source = calloc(1, 1 << 16), hex[16];
-    REQUIRE(source && fread(source, 1, (1 << 16) - 1, legend) > 0);
-    fclose(legend);
-    const char *at = strstr(source, "COLOURS = ");
+    REQUIRE(source && fread(source, 1, (1 << 16) - 1, maps) > 0);
+    fclose(maps);
+    const char *at = strstr(source, "SEQUENTIAL = ");
     for (int i = 0; i < 9 && at; i++) {
         snprintf(hex, sizeof hex, "\"#%06x\"", stop[i]);
         at = strstr(at, hex);
