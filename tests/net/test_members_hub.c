@@ -258,7 +258,7 @@ static void who_fills_places_keeps_nobody_out(void)
 
 static void places_are_kept_for_instructors(void)
 {
-    mem_client crowd[16], teacher;
+    static mem_client crowd[16], teacher;
     begin(16);
     for (int i = 0; i < 16; i++) join(&crowd[i], "crowd", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
     for (int i = 0; i < 16; i++)
