@@ -18,6 +18,7 @@ import {
     scratch,
     serve,
     until,
+    drawn,
 } from "./common.mjs";
 
 /** what a page shows: counts of the panel, triangles and their vertices, open edges, shortest and longest edge */
@@ -87,14 +88,6 @@ const middlePixel = (page) =>
             }
         return null;
     });
-/** waits until the picture is up to date, at most 3 s: while frames arrive it never is */
-const drawn = (page) =>
-    until(
-        () => page.evaluate(() => !window.palpate.stage.dirty && window.palpate.stage.ready()),
-        (last) => last,
-        3000,
-    );
-
 await run(async () => {
     const folder = join(scratch, "stomach");
     execFileSync(palpate, ["prepare", "--shape", "stomach", "-o", folder, "--quiet"]);

@@ -147,6 +147,21 @@ export const organPixel = (page) =>
         return null;
     });
 
+/** the next picture of the organ is drawn; one that moves is never drawn to an end */
+export async function drawn(page) {
+    const before = await page.evaluate(() => {
+        const { stage } = window.palpate;
+        stage.dirty = true;
+        return stage.pictures;
+    });
+    await until(() =>
+        page.evaluate((n) => {
+            const { stage } = window.palpate;
+            return stage.pictures > n && !stage.pace.drawing;
+        }, before),
+    );
+}
+
 const openPage = () => browsers.flatMap((b) => b.contexts().flatMap((c) => c.pages())).find((p) => !p.isClosed());
 /** the next picture of a page */
 export const nextFrame = (page) => page.evaluate(() => new Promise(requestAnimationFrame));

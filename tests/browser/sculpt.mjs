@@ -16,6 +16,7 @@ import {
     serve,
     settled,
     until,
+    drawn,
 } from "./common.mjs";
 
 /** what a page shows */
@@ -140,11 +141,6 @@ const stiffnessAt = (page, { x, y }) =>
         { x, y },
     );
 const tool = (page, name) => page.click(`#sculpt-tools button[data-name=${name}]`);
-const drawn = async (page) =>
-    until(
-        () => page.evaluate(() => !window.palpate.stage.dirty && window.palpate.stage.ready()),
-        (ready) => ready,
-    );
 
 await run(async () => {
     execFileSync(palpate, ["cells", "chair", "-o", join(scratch, "chair.palcells"), "--quiet"]);
