@@ -238,7 +238,7 @@ export const GERMAN = {
     "notice.restarted": "Der Server wurde neu gestartet.",
     "notice.scene": "die Szene",
     "notice.slow_browser":
-        "Dieser Browser zeichnet langsam (Bilder je Sekunde: {n}). Das Organ bewegt sich so schnell wie sonst; ein Rechner mit Grafikprozessor zeigt es flüssig.",
+        "Dieser Browser zeichnet langsam (Bilder je Sekunde: {n}). Die Simulation wartet nicht darauf; ein Rechner mit Grafikprozessor zeigt es flüssig.",
     "notice.stopped": "{names} wurde angehalten.",
     "order.allow": "hat Rechte geändert für",
     "order.ban": "hat ausgeschlossen:",

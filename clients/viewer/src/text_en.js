@@ -237,7 +237,7 @@ export const ENGLISH = {
     "notice.restarted": "The server was started again.",
     "notice.scene": "the scene",
     "notice.slow_browser":
-        "This browser draws slowly (pictures a second: {n}). The organ moves as fast as ever; a computer with a graphics processor shows it smoothly.",
+        "This browser draws slowly (pictures a second: {n}). The simulation does not wait for it; a computer with a graphics processor shows it smoothly.",
     "notice.stopped": "{names} stopped.",
     "order.allow": "changed what is allowed for",
     "order.ban": "banned",
