@@ -13,6 +13,7 @@ static const struct {
     {"springs", "", "forces, integration and skinning against the limits of the machine", bench_springs},
     {"adaptive", "", "surfaces that refine where they are touched: coarse, refined, adaptive", bench_adaptive},
     {"fem", "", "live steps and static solves of finite elements", bench_fem},
+    {"organ", "[SURFACE.ply]", "finite-element organs of growing size by each preconditioner", bench_organ},
     {"solids", "", "subdivision solids as finite elements (paper A, Table 1)", bench_solids},
     {"calibrate", "[FOLDER]",
      "springs fitted to finite elements, by gradient and by annealing\n                      (FOLDER: deploy/problems)",

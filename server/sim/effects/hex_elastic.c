@@ -142,8 +142,18 @@ static void stress(void *self, const pal_body *body, pal_stress_take *take, void
     pal_hex_stress(self, body, take, user);
 }
 
-static const pal_tangent tangent = {
-    .couple = couple, .linearise = linearise, .multiply = multiply, .assemble = assemble, .rotate = rotate};
+static const pal_elastic_hexes *cubes(const void *self)
+{
+    const pal_elastic_hexes *hexes = self;
+    return hexes->law == PAL_LAW_NEO_HOOKEAN ? NULL : hexes;
+}
+
+static const pal_tangent tangent = {.couple = couple,
+                                    .linearise = linearise,
+                                    .multiply = multiply,
+                                    .assemble = assemble,
+                                    .rotate = rotate,
+                                    .cubes = cubes};
 
 const pal_effect pal_effect_hex_elastic = {
     PAL_EFFECT("hex_elastic", FORCE),

@@ -17,7 +17,7 @@ static void multiply(void *user, const double *p, double *out)
 
 static void precondition(void *user, const double *r, double *z)
 {
-    pal_warp_solve(&((pal_compliance_solver *)user)->warp, r, z);
+    pal_preconditioner_solve(&((pal_compliance_solver *)user)->preconditioner, r, z);
 }
 
 /* the earlier answer to the force most like r; the one unused for longest when none is; *share: how much of it fits */
@@ -98,22 +98,24 @@ static pal_err make_arrays(pal_compliance_solver *solver, pal_arena *arena)
     return made ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-pal_err pal_compliance_solver_factor(pal_compliance_solver *solver, pal_block_matrix *blocks, bool later)
+pal_err pal_compliance_solver_update(pal_compliance_solver *solver, bool later)
 {
     pal_system *system = solver->system;
     const double mass = system->mass, stiff = system->stiff, viscous = system->viscous, damp = system->damp;
+    pal_err err = PAL_ERR_OK;
     pal_compliance_solver_reset(solver);
     system->mass = 0, system->stiff = 1, system->viscous = system->damp = 0;
-    pal_system_assemble(system, blocks);
+    if (later)
+        (void)pal_preconditioner_refresh(&solver->preconditioner, true);
+    else
+        err = pal_preconditioner_update(&solver->preconditioner);
     system->mass = mass, system->stiff = stiff, system->viscous = viscous, system->damp = damp;
-    if (!later) return pal_warp_factor(&solver->warp, blocks);
-    (void)pal_warp_refresh(&solver->warp, blocks, true);
-    return PAL_ERR_OK;
+    return err;
 }
 
-pal_err pal_compliance_solver_make(pal_system *system, const pal_node_rotations *rotations, pal_block_matrix *blocks,
-                                   pal_arena *arena, pal_compliance_solver *out)
+pal_err pal_compliance_solver_make(const pal_preconditioner *like, pal_arena *arena, pal_compliance_solver *out)
 {
+    pal_system *system = like->system;
     pal_body *body = system->body;
     pal_support_report supports;
     memset(out, 0, sizeof *out);
@@ -122,8 +124,9 @@ pal_err pal_compliance_solver_make(pal_system *system, const pal_node_rotations 
     if (supports.n_unsupported > 0) return PAL_ERR_OK;
     out->system = system;
     PAL_TRY(make_arrays(out, arena));
-    PAL_TRY(pal_warp_make(blocks, body, rotations, true, arena, &out->warp));
-    pal_err err = pal_compliance_solver_factor(out, blocks, false);
+    const pal_preconditioner_options options = {.single = true, .like = like};
+    PAL_TRY(pal_preconditioner_make(&options, system, like->rotations, arena, NULL, &out->preconditioner));
+    pal_err err = pal_compliance_solver_update(out, false);
     if (err == PAL_ERR_MEMORY) return err;
     /* not positive definite: there is no answer to give */
     if (err) return PAL_ERR_OK;
@@ -132,18 +135,16 @@ pal_err pal_compliance_solver_make(pal_system *system, const pal_node_rotations 
     return PAL_ERR_OK;
 }
 
-void pal_compliance_solver_report(const pal_compliance_solver *solver, const pal_system *system, const pal_warp *warp,
+void pal_compliance_solver_report(const pal_compliance_solver *solver, const pal_preconditioner *preconditioner,
                                   pal_solve_report *out)
 {
-    out->assemble_s = system->assemble_s;
-    if (!warp->factor) return;
-    out->factor_nonzeros = pal_cholesky_nonzeros(warp->factor);
-    out->n_factor = warp->n_factor;
-    out->analyse_s = warp->analyse_s + solver->warp.analyse_s;
-    out->factor_s = warp->factor_s + solver->warp.factor_s;
+    if (!preconditioner->system) return;
+    pal_preconditioner_report(preconditioner, out);
+    out->analyse_s += solver->preconditioner.analyse_s;
+    out->factor_s += solver->preconditioner.update_s;
 }
 
 void pal_compliance_solver_destroy(pal_compliance_solver *solver)
 {
-    pal_warp_destroy(&solver->warp);
+    pal_preconditioner_destroy(&solver->preconditioner);
 }

@@ -10,7 +10,7 @@
 #ifndef PAL_SIM_IMPLICIT_COMPLIANCE_H
 #define PAL_SIM_IMPLICIT_COMPLIANCE_H
 #include "server/num/conjugate_gradient.h"
-#include "server/sim/implicit/warp.h"
+#include "server/sim/implicit/preconditioner.h"
 
 /* number of cached loads: one per contact patch or per axis of a grasp */
 enum { PAL_COMPLIANCE_CACHE = 4 };
@@ -21,8 +21,8 @@ typedef struct pal_compliance_entry {
 } pal_compliance_entry;
 
 typedef struct pal_compliance_solver {
-    pal_compliance hook; /* what the body publishes */
-    pal_warp warp;
+    pal_compliance hook;               /* what the body publishes */
+    pal_preconditioner preconditioner; /* of K alone */
     pal_system *system;
     pal_conjugate_gradient cg;
     double *x, *f, *low; /* saved while forces are evaluated: of points, of nodes, of points */
@@ -31,15 +31,14 @@ typedef struct pal_compliance_solver {
     uint64_t n_call;
 } pal_compliance_solver;
 
-/* The components are linearised at rest. blocks: work space with K's pattern. Nothing is published when no component
+/* The components are linearised at rest. like: the solver's preconditioner. Nothing is published when no component
  * wants it or when the supports leave a rigid motion free. MEMORY. [load] */
-pal_err pal_compliance_solver_make(pal_system *system, const pal_node_rotations *rotations, pal_block_matrix *blocks,
-                                   pal_arena *arena, pal_compliance_solver *out);
-/* factors the components' present linearisation at rest, after a material edit; later: on a spare thread (warp.h) */
-pal_err pal_compliance_solver_factor(pal_compliance_solver *solver, pal_block_matrix *blocks, bool later);
+pal_err pal_compliance_solver_make(const pal_preconditioner *like, pal_arena *arena, pal_compliance_solver *out);
+/* takes the components' present linearisation at rest, after a material edit; later: on a spare thread */
+pal_err pal_compliance_solver_update(pal_compliance_solver *solver, bool later);
 void pal_compliance_solver_reset(pal_compliance_solver *solver); /* the body is back at rest */
-/* sets sizes and times of a report: of the solver's factor, and times of the factor here as well */
-void pal_compliance_solver_report(const pal_compliance_solver *solver, const pal_system *system, const pal_warp *warp,
+/* sets sizes and times of a report: of the solver's preconditioner, and times of the one here as well */
+void pal_compliance_solver_report(const pal_compliance_solver *solver, const pal_preconditioner *preconditioner,
                                   pal_solve_report *out);
 void pal_compliance_solver_destroy(pal_compliance_solver *solver);
 #endif

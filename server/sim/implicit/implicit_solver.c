@@ -23,6 +23,8 @@ static pal_err read_keys(pal_config_entry *item, const pal_build *build, pal_imp
                                   .refresh = true,
                                   .warp = true,
                                   .watch = true};
+    static const char *const kinds[] = {"auto", "jacobi", "factor", "multigrid"};
+    int kind = PAL_PRECONDITION_AUTO;
     PAL_TRY(pal_entry_read_number(item, "tolerance", 1e-14, 0.5, &out->tolerance, build->diag));
     PAL_TRY(pal_entry_read_count(item, "iterations", 1, 100000, &out->iterations, build->diag));
     PAL_TRY(pal_entry_read_count(item, "newton", 1, 1000, &out->newton, build->diag));
@@ -32,7 +34,9 @@ static pal_err read_keys(pal_config_entry *item, const pal_build *build, pal_imp
     PAL_TRY(pal_entry_read_bool(item, "refresh", &out->refresh, build->diag));
     PAL_TRY(pal_entry_read_bool(item, "warp", &out->warp, build->diag));
     PAL_TRY(pal_entry_read_bool(item, "watch", &out->watch, build->diag));
+    PAL_TRY(pal_entry_read_choice(item, "preconditioner", kinds, 4, &kind, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
+    out->preconditioner = (pal_precondition)kind;
     if (out->substep_s == 0) out->substep_s = INFINITY;
     return PAL_ERR_OK;
 }
@@ -44,7 +48,7 @@ static void multiply(void *user, const double *p, double *out)
 
 static void precondition(void *user, const double *r, double *z)
 {
-    pal_warp_solve(&((pal_implicit *)user)->warp, r, z);
+    pal_preconditioner_solve(&((pal_implicit *)user)->preconditioner, r, z);
 }
 
 static pal_err make_arrays(pal_implicit *core, pal_arena *arena)
@@ -83,10 +87,8 @@ static pal_err factor_at_rest(pal_implicit *core)
         (void)pal_system_probe(&core->system, INT_MAX);
     }
     set_factors(core, core->tau_rest_s);
-    pal_system_assemble(&core->system, &core->blocks);
-    PAL_TRY(pal_warp_factor(&core->warp, &core->blocks));
-    return core->compliance.hook.solve ? pal_compliance_solver_factor(&core->compliance, &core->blocks, false)
-                                       : PAL_ERR_OK;
+    PAL_TRY(pal_preconditioner_update(&core->preconditioner));
+    return core->compliance.hook.solve ? pal_compliance_solver_update(&core->compliance, false) : PAL_ERR_OK;
 }
 
 pal_err pal_implicit_make(pal_config_entry *item, pal_build *build, double share, void **self)
@@ -100,14 +102,13 @@ pal_err pal_implicit_make(pal_config_entry *item, pal_build *build, double share
     PAL_TRY(pal_system_make(build, &core->system));
     PAL_TRY(make_arrays(core, build->arena));
     if (core->system.n_free == 0) return PAL_ERR_OK;
-    PAL_TRY(pal_system_pattern(&core->system, build->arena, &core->blocks));
     PAL_TRY(pal_node_rotations_make(&core->system, build->arena, &core->rotations));
     core->rotations.any &= core->options.warp;
-    PAL_TRY(pal_warp_make(&core->blocks, body, &core->rotations, true, build->arena, &core->warp));
+    const pal_preconditioner_options options = {.kind = core->options.preconditioner, .single = true};
+    PAL_TRY(pal_preconditioner_make(&options, &core->system, &core->rotations, build->arena, build->diag,
+                                    &core->preconditioner));
     pal_err err = factor_at_rest(core);
-    if (!err)
-        err =
-            pal_compliance_solver_make(&core->system, &core->rotations, &core->blocks, build->arena, &core->compliance);
+    if (!err) err = pal_compliance_solver_make(&core->preconditioner, build->arena, &core->compliance);
     if (err == PAL_ERR_NUMERIC)
         return PAL_REFUSE(build->diag,
                           "body \"%s\": mass and stiffness at rest for steps of %g s make no positive definite matrix",
@@ -118,7 +119,7 @@ pal_err pal_implicit_make(pal_config_entry *item, pal_build *build, double share
 void pal_implicit_destroy(void *self)
 {
     pal_implicit *core = self;
-    pal_warp_destroy(&core->warp);
+    pal_preconditioner_destroy(&core->preconditioner);
     pal_compliance_solver_destroy(&core->compliance);
 }
 
@@ -340,7 +341,7 @@ static void line_search(pal_implicit *core, double tau)
 static void iterate(pal_implicit *core, double tau, double target)
 {
     pal_node_rotations_update(&core->rotations, &core->system);
-    pal_warp_rotate(&core->warp, &core->rotations);
+    pal_preconditioner_rotate(&core->preconditioner);
     memcpy(core->moved, core->cg.r, pal_body_bytes3(core->system.body));
     solve_linear(core, target);
     keep_momentum(core);
@@ -528,12 +529,12 @@ static void update_probed(pal_implicit *core, pal_step *step)
     core->probes += PAL_PROBES_1_S * step->dt_s;
     int n = (int)core->probes;
     core->probes -= n;
-    if (!pal_system_probe(system, n) || !pal_warp_ready(&core->warp) || !pal_warp_ready(&core->compliance.warp)) return;
+    if (!pal_system_probe(system, n) || !pal_preconditioner_ready(&core->preconditioner) ||
+        !pal_preconditioner_ready(&core->compliance.preconditioner))
+        return;
     set_factors(core, core->tau_rest_s);
-    pal_system_assemble(system, &core->blocks);
-    core->probing = !pal_warp_refresh(&core->warp, &core->blocks, true);
-    if (!core->probing && core->compliance.hook.solve)
-        (void)pal_compliance_solver_factor(&core->compliance, &core->blocks, true);
+    core->probing = !pal_preconditioner_refresh(&core->preconditioner, true);
+    if (!core->probing && core->compliance.hook.solve) (void)pal_compliance_solver_update(&core->compliance, true);
 }
 
 void pal_implicit_end(pal_implicit *core, pal_step *step)
@@ -547,17 +548,17 @@ void pal_implicit_end(pal_implicit *core, pal_step *step)
     }
     core->rose_s = core->energy_rose ? PAL_PAUSE_S : fmax(0, core->rose_s - step->dt_s);
     pal_body_update_nodes(body);
-    pal_warp_step(&core->warp, step->dt_s);
-    pal_warp_step(&core->compliance.warp, step->dt_s);
-    if (core->compliance.hook.solve) pal_warp_rotate(&core->compliance.warp, &core->rotations);
+    pal_preconditioner_step(&core->preconditioner, step->dt_s);
+    if (core->compliance.hook.solve) {
+        pal_preconditioner_step(&core->compliance.preconditioner, step->dt_s);
+        pal_preconditioner_rotate(&core->compliance.preconditioner);
+    }
     if (core->system.interpolated_system) {
         update_probed(core, step);
         return;
     }
     if (!core->options.refresh || core->max_cg <= core->options.refresh_iterations) return;
-    if (!pal_warp_ready(&core->warp)) return;
-    pal_system_assemble(&core->system, &core->blocks);
-    (void)pal_warp_refresh(&core->warp, &core->blocks, false);
+    (void)pal_preconditioner_refresh(&core->preconditioner, false);
 }
 
 /* ---- hooks ---- */
@@ -601,14 +602,14 @@ void pal_implicit_reset(void *self, const pal_body *body)
     if (core->system.n_free == 0) return;
     pal_node_rotations_reset(&core->rotations);
     pal_compliance_solver_reset(&core->compliance);
-    if (core->compliance.hook.solve) pal_warp_rotate(&core->compliance.warp, &core->rotations);
+    if (core->compliance.hook.solve) pal_preconditioner_rotate(&core->compliance.preconditioner);
     /* the same factor as at load, so that a run repeats; without memory for it the present one still serves */
-    if (core->warp.refreshed || core->warp.pending || core->probing) (void)factor_at_rest(core);
+    if (core->preconditioner.refreshed || core->preconditioner.pending || core->probing) (void)factor_at_rest(core);
 }
 
 void pal_implicit_report(const void *self, pal_solve_report *out)
 {
     const pal_implicit *core = self;
     *out = core->report;
-    pal_compliance_solver_report(&core->compliance, &core->system, &core->warp, out);
+    pal_compliance_solver_report(&core->compliance, &core->preconditioner, out);
 }

@@ -2,7 +2,8 @@
  *     M (V - v*) = tau (f(x* + tau V) - c M V - beta K V),
  * where f is the force of all components and contact, c the drag rate and beta the key stiffness_damping_s. Newton's
  * method linearises the forces about a state, so that V solves A V = b, A = (1 + tau c) M + (tau^2 + tau beta) K + tau
- * D, by conjugate gradients with the warped factor of A at rest.
+ * D, by conjugate gradients with a preconditioner of A at rest that is warped
+ * (preconditioner.h).
  *
  * The first iteration starts from the state at the beginning of the stage, not from an extrapolated one. With the
  * rotations of that state the quadratic that is solved bounds the corotational energy (except its volume term) from
@@ -30,16 +31,16 @@ typedef struct pal_implicit_options {
     double damping_s;       /* 0: beta of damping forces -beta K v, which damp a mode w at the rate beta w^2 / 2 */
     int refresh_iterations; /* 12: a solve that takes more starts a new factor, if ... */
     bool refresh;           /* ... true                                                                    */
-    bool warp;              /* true: the factor rotates with the body (false for comparison) */
-    bool watch;             /* true: energy is checked (false for comparison of the cost) */
+    pal_precondition preconditioner; /* auto */
+    bool warp;                       /* true: the factor rotates with the body (false for comparison) */
+    bool watch;                      /* true: energy is checked (false for comparison of the cost) */
 } pal_implicit_options;
 
 typedef struct pal_implicit {
     pal_implicit_options options;
     pal_system system;
-    pal_block_matrix blocks; /* pattern of K; values are work space */
     pal_node_rotations rotations;
-    pal_warp warp;
+    pal_preconditioner preconditioner;
     pal_compliance_solver compliance; /* compliance.hook.solve NULL: not wanted or not available */
     pal_conjugate_gradient cg;
     double *x0, *v0; /* at the beginning of the sub-step [n_dof][3] */

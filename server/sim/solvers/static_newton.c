@@ -37,7 +37,6 @@
  * Departure from the rules of a step: `direct` and `auto` take heap memory for factors. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
-#include "server/num/incomplete_cholesky.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/core/rigid_motion.h"
 #include "server/sim/core/step_guard.h"
@@ -47,9 +46,10 @@
 
 #include <float.h>
 #include <limits.h>
+#include <stdlib.h>
 #include <string.h>
 
-typedef enum linear_kind { LINEAR_AUTO, LINEAR_DIRECT, LINEAR_PCG, LINEAR_INCOMPLETE } linear_kind;
+typedef enum linear_kind { LINEAR_AUTO, LINEAR_DIRECT, LINEAR_PCG, LINEAR_INCOMPLETE, LINEAR_MULTIGRID } linear_kind;
 
 typedef struct static_newton {
     double tolerance, cg_tolerance;
@@ -57,10 +57,8 @@ typedef struct static_newton {
     linear_kind linear;
     bool relieved, constant; /* inertia relief; K never changes (linear law) */
     pal_system system;
-    pal_block_matrix blocks;
     pal_node_rotations rotations;
-    pal_warp warp;
-    pal_incomplete_cholesky incomplete; /* replaces the warp's factor */
+    pal_preconditioner preconditioner;
     pal_compliance_solver compliance;
     pal_conjugate_gradient cg;
     double *x0, *external_force; /* at the beginning of the step; external loads [n_dof][3] */
@@ -87,7 +85,7 @@ enum { BACKOFF = 4, RECOVERIES_MAX = 8 };
 
 static pal_err read_keys(pal_config_entry *item, const pal_build *build, static_newton *solver)
 {
-    static const char *const linear[] = {"auto", "direct", "pcg", "incomplete"};
+    static const char *const linear[] = {"auto", "direct", "pcg", "incomplete", "multigrid"};
     static const char *const rigid[] = {"refuse", "inertia_relief"};
     int kind = 0, relieved = 0;
     solver->tolerance = 1e-8, solver->cg_tolerance = 1e-3;
@@ -97,7 +95,7 @@ static pal_err read_keys(pal_config_entry *item, const pal_build *build, static_
     PAL_TRY(pal_entry_read_count(item, "newton", 1, 100000, &solver->newton, build->diag));
     PAL_TRY(pal_entry_read_count(item, "load_steps", 1, 10000, &solver->load_steps, build->diag));
     PAL_TRY(pal_entry_read_count(item, "iterations", 1, 100000, &solver->iterations, build->diag));
-    PAL_TRY(pal_entry_read_choice(item, "linear", linear, 4, &kind, build->diag));
+    PAL_TRY(pal_entry_read_choice(item, "linear", linear, 5, &kind, build->diag));
     PAL_TRY(pal_entry_read_choice(item, "free", rigid, 2, &relieved, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     solver->linear = (linear_kind)kind;
@@ -127,11 +125,7 @@ static void multiply_true(void *user, const double *p, double *out)
 
 static void precondition(void *user, const double *r, double *z)
 {
-    static_newton *solver = user;
-    if (solver->linear == LINEAR_INCOMPLETE)
-        pal_incomplete_cholesky_solve(&solver->incomplete, r, z);
-    else
-        pal_warp_solve(&solver->warp, r, z);
+    pal_preconditioner_solve(&((static_newton *)user)->preconditioner, r, z);
 }
 
 static pal_err make_arrays(static_newton *solver, pal_arena *arena)
@@ -162,10 +156,8 @@ static void probe(static_newton *solver)
 static pal_err factor(static_newton *solver)
 {
     if (solver->system.interpolated_system) probe(solver);
-    pal_system_assemble(&solver->system, &solver->blocks);
-    PAL_TRY(solver->linear == LINEAR_INCOMPLETE ? pal_incomplete_cholesky_factor(&solver->incomplete, &solver->blocks)
-                                                : pal_warp_factor(&solver->warp, &solver->blocks));
-    if (solver->system.interpolated_system) pal_warp_set_rest(&solver->warp);
+    PAL_TRY(pal_preconditioner_update(&solver->preconditioner));
+    if (solver->system.interpolated_system) pal_preconditioner_set_rest(&solver->preconditioner);
     solver->has_factor = true;
     solver->stale = false;
     solver->age = 0;
@@ -173,17 +165,19 @@ static pal_err factor(static_newton *solver)
 }
 
 /* eps: the square root of rounding, times K over mass */
-static void choose_shift(static_newton *solver)
+static pal_err choose_shift(static_newton *solver)
 {
-    const pal_body *body = solver->system.body;
-    double stiff = 0, mass = 0;
-    pal_system_assemble(&solver->system, &solver->blocks);
-    for (int i = 0; i < body->n_dof; i++) {
-        const double *block = solver->blocks.value + 9 * (size_t)solver->blocks.start[i];
-        stiff += (block[0] + block[4] + block[8]) / 3;
-        mass += body->mass_kg[i];
-    }
+    const pal_system *system = &solver->system;
+    const pal_body *body = system->body;
+    double stiff = 0, mass = 0, *bound = calloc((size_t)body->n_node, sizeof *bound);
+    if (!bound) return PAL_ERR_MEMORY;
+    for (int i = 0; i < system->n_force; i++)
+        if (system->force[i].effect->bounds.stiffness)
+            system->force[i].effect->bounds.stiffness(system->force[i].self, body, bound);
+    for (int i = 0; i < body->n_dof; i++) stiff += bound[i], mass += body->mass_kg[i];
+    free(bound);
     solver->system.mass = sqrt(DBL_EPSILON) * stiff / mass;
+    return PAL_ERR_OK;
 }
 
 static pal_err check_supports(static_newton *solver, const pal_build *build)
@@ -222,18 +216,19 @@ static pal_err make_factors(static_newton *solver, pal_build *build)
                           "control points; take \"pcg\"",
                           body->name, solver->linear == LINEAR_DIRECT ? "direct" : "incomplete");
     if (body->interpolation) solver->linear = LINEAR_PCG;
-    PAL_TRY(pal_system_pattern(&solver->system, build->arena, &solver->blocks));
     PAL_TRY(pal_node_rotations_make(&solver->system, build->arena, &solver->rotations));
-    if (solver->linear == LINEAR_INCOMPLETE)
-        PAL_TRY(pal_incomplete_cholesky_make(&solver->blocks, body->support, build->arena, &solver->incomplete));
-    else
-        PAL_TRY(pal_warp_make(&solver->blocks, body, &solver->rotations, false, build->arena, &solver->warp));
+    static const pal_precondition kind[] = {
+        [LINEAR_AUTO] = PAL_PRECONDITION_AUTO,           [LINEAR_DIRECT] = PAL_PRECONDITION_FACTOR,
+        [LINEAR_PCG] = PAL_PRECONDITION_FACTOR,          [LINEAR_INCOMPLETE] = PAL_PRECONDITION_INCOMPLETE,
+        [LINEAR_MULTIGRID] = PAL_PRECONDITION_MULTIGRID,
+    };
+    const pal_preconditioner_options options = {.kind = kind[solver->linear]};
+    PAL_TRY(pal_preconditioner_make(&options, &solver->system, &solver->rotations, build->arena, build->diag,
+                                    &solver->preconditioner));
     pal_system_linearise(&solver->system);
-    if (solver->relieved) choose_shift(solver);
+    if (solver->relieved) PAL_TRY(choose_shift(solver));
     pal_err err = solver->linear == LINEAR_DIRECT ? PAL_ERR_OK : factor(solver);
-    if (!err)
-        err = pal_compliance_solver_make(&solver->system, &solver->rotations, &solver->blocks, build->arena,
-                                         &solver->compliance);
+    if (!err) err = pal_compliance_solver_make(&solver->preconditioner, build->arena, &solver->compliance);
     if (err == PAL_ERR_NUMERIC)
         return PAL_REFUSE(build->diag, "body \"%s\": its stiffness at rest is not positive definite", body->name);
     return err;
@@ -256,7 +251,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 static void destroy(void *self)
 {
     static_newton *solver = self;
-    pal_warp_destroy(&solver->warp);
+    pal_preconditioner_destroy(&solver->preconditioner);
     pal_compliance_solver_destroy(&solver->compliance);
 }
 
@@ -364,6 +359,16 @@ static int run_true(static_newton *solver, double target, double size)
     return 0;
 }
 
+/* iterations of a solve that are worth a preconditioner of the present K */
+static double iterations_worth(const static_newton *solver)
+{
+    const pal_cholesky *factor = solver->preconditioner.factor;
+    if (!factor) return PAL_MULTIGRID_ITERATIONS;
+    const double worth =
+        pal_cholesky_flops(factor) / (PAL_FACTOR_FLOPS_PER_ENTRY * (double)(pal_cholesky_nonzeros(factor) + 1));
+    return fmin(fmax(worth, 10), 100);
+}
+
 /* conjugate gradients on K, or on the true stiffness if that is positive */
 static void run_gradients(static_newton *solver, double size)
 {
@@ -374,10 +379,8 @@ static void run_gradients(static_newton *solver, double size)
         n = pal_conjugate_gradient_run(&solver->cg, solver->move, target, 1, solver->iterations);
         solver->report.n_cg += n;
     }
-    if (solver->linear == LINEAR_INCOMPLETE) return;
-    double worth = pal_cholesky_flops(solver->warp.factor) /
-                   (PAL_FACTOR_FLOPS_PER_ENTRY * (double)(pal_cholesky_nonzeros(solver->warp.factor) + 1));
-    solver->stale = n > fmin(fmax(worth, 10), 100);
+    if (solver->preconditioner.kind == PAL_PRECONDITION_INCOMPLETE) return;
+    solver->stale = n > iterations_worth(solver);
     solver->eager |= ++solver->age == 2 && solver->stale;
 }
 
@@ -387,12 +390,12 @@ static pal_err solve_linear(static_newton *solver, double size)
     bool fresh = (solver->linear == LINEAR_DIRECT || solver->linear == LINEAR_INCOMPLETE) && !solver->constant;
     bool direct = solver->linear == LINEAR_DIRECT && !solver->system.has_contact && !solver->exact;
     memset(solver->move, 0, pal_body_bytes3(solver->system.body));
-    if (!solver->has_factor || fresh || (solver->linear == LINEAR_AUTO && (solver->stale || solver->eager)))
-        PAL_TRY(factor(solver));
-    if (solver->warp.factor) pal_warp_rotate(&solver->warp, &solver->rotations);
+    const bool renews = solver->linear == LINEAR_AUTO || solver->linear == LINEAR_MULTIGRID;
+    if (!solver->has_factor || fresh || (renews && (solver->stale || solver->eager))) PAL_TRY(factor(solver));
+    pal_preconditioner_rotate(&solver->preconditioner);
     double before = pal_clock_s();
     if (direct)
-        pal_warp_solve(&solver->warp, solver->cg.r, solver->move);
+        pal_preconditioner_solve(&solver->preconditioner, solver->cg.r, solver->move);
     else
         run_gradients(solver, size);
     if (solver->relieved) {
@@ -511,7 +514,7 @@ static pal_err solve(static_newton *solver, pal_step *step, bool *bad)
     if (solver->sampled != pal_dofs_material_revision(&body->dofs)) solver->has_factor = false;
     if (solver->part == 0) solver->part = 1;
     PAL_TRY(find_rest(solver, step));
-    if (solver->compliance.hook.solve) pal_warp_rotate(&solver->compliance.warp, &solver->rotations);
+    if (solver->compliance.hook.solve) pal_preconditioner_rotate(&solver->compliance.preconditioner);
     *bad = !pal_guard_check_finite(body);
     if (*bad) memcpy(body->x, solver->x0, pal_body_bytes3(solver->system.body));
     pal_body_update_nodes(body);
@@ -563,7 +566,7 @@ static void reset(void *self, const pal_body *body)
     if (solver->system.n_free == 0) return;
     pal_node_rotations_reset(&solver->rotations);
     /* the factor is of another state: rebuild it when it is needed */
-    if (solver->linear != LINEAR_PCG && solver->warp.n_factor > 1) solver->has_factor = false;
+    if (solver->linear != LINEAR_PCG && solver->preconditioner.n_update > 1) solver->has_factor = false;
 }
 
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
@@ -575,7 +578,7 @@ static pal_err material(void *self, const pal_body *body, const pal_material *to
     if (solver->system.interpolated_system) probe(solver);
     pal_node_rotations_reset(&solver->rotations);
     pal_system_linearise_rest(&solver->system);
-    pal_err err = pal_compliance_solver_factor(&solver->compliance, &solver->blocks, false);
+    pal_err err = pal_compliance_solver_update(&solver->compliance, false);
     if (err == PAL_ERR_NUMERIC)
         return PAL_REFUSE(diag, "body \"%s\": its stiffness at rest is not positive definite", body->name);
     return err;
@@ -585,7 +588,7 @@ static void report(const void *self, pal_solve_report *out)
 {
     const static_newton *solver = self;
     *out = solver->report;
-    pal_compliance_solver_report(&solver->compliance, &solver->system, &solver->warp, out);
+    pal_compliance_solver_report(&solver->compliance, &solver->preconditioner, out);
 }
 
 const pal_effect pal_effect_static_newton = {PAL_EFFECT("static_newton", SOLVE),

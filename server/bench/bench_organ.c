@@ -1,0 +1,192 @@
+/* `palpate bench organ [SURFACE.ply]`: finite-element organs of growing size, live under a pull that is switched on and
+ * off, by each preconditioner. The voxels of a closed surface, or of a computed organ; its lowest 12 % are held, E
+ * 20 kPa, nu 0.45; the nodes within a fifth of the organ's length of its highest one are pulled sideways. Medians over
+ * steps, one thread. */
+#include "server/bench/bench.h"
+#include "server/bench/bench_body.h"
+
+#include "server/base/clock.h"
+#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/geometry/procedural.h"
+#include "server/num/median.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { STEPS_MAX = 120 };
+
+typedef struct job {
+    pal_prepared mesh;
+    const char *solver, *kind;
+    double young_Pa, step_s;
+} job;
+
+/* the resolution that gives nearest to so many nodes */
+static pal_err make_body(const pal_surface *surface, int n_node, pal_prepared *out, pal_diagnostic *diag)
+{
+    int best = 0;
+    double nearest = INFINITY;
+    for (int low = 8, high = 160; low <= high;) {
+        const int resolution = (low + high) / 2;
+        pal_voxel_options options = {.resolution = resolution, .border = true};
+        pal_voxels voxels;
+        pal_voxel_report report;
+        PAL_TRY(pal_voxels_fill(surface, &options, &voxels, &report, diag));
+        /* a body of n voxels has some n + 3 n^(2/3) nodes */
+        const double n = (double)(voxels.n_inside + voxels.n_border), nodes = n + 3 * cbrt(n * n);
+        pal_voxels_free(&voxels);
+        if (fabs(nodes - n_node) < nearest) nearest = fabs(nodes - n_node), best = resolution;
+        if (nodes < n_node)
+            low = resolution + 1;
+        else
+            high = resolution - 1;
+    }
+    pal_voxel_options options = {.resolution = best, .border = true};
+    pal_prepare_report report;
+    return pal_prepared_make(surface, &options, out, &report, diag);
+}
+
+static pal_err make_scene(const job *j, pal_scene *scene, pal_diagnostic *diag)
+{
+    pal_scene_default(scene);
+    scene->n_body = 1;
+    scene->step_s = j->step_s;
+    pal_body_def *body = &scene->body[0];
+    pal_body_default(body, "body", &j->mesh);
+    body->material.young_Pa = j->young_Pa, body->material.poisson = 0.45;
+    body->output.name[0] = 0;
+    body->n_effect = 0;
+    pal_entry_init(&body->model, "model", "fem");
+    pal_entry_init(&body->solver, "solver", j->solver);
+    return pal_entry_put_text(&body->solver, !strcmp(j->solver, "static_newton") ? "linear" : "preconditioner", j->kind,
+                              diag);
+}
+
+/* pulls the nodes around the highest one, share of E S^2 */
+static pal_err pull(pal_world *world, const job *j, double share)
+{
+    pal_body *body = pal_world_body(world, 0);
+    const double size = body->length_scale_m;
+    int top = 0, n = 0;
+    for (int i = 0; i < body->n_node; i++)
+        if (body->x_rest[3 * i + 2] > body->x_rest[3 * top + 2]) top = i;
+    for (int turn = 0; turn < 2; turn++)
+        for (int i = 0; i < body->n_node; i++) {
+            double d2 = 0;
+            for (int c = 0; c < 3; c++) d2 += pow(body->x_rest[3 * i + c] - body->x_rest[3 * top + c], 2);
+            if (d2 > 0.04 * size * size) continue;
+            if (turn == 0)
+                n++;
+            else
+                PAL_TRY(pal_world_load(world, 0, i, (double[]){share * j->young_Pa * size * size / n, 0, 0}));
+        }
+    body->load_cap_N = INFINITY;
+    return PAL_ERR_OK;
+}
+
+static double largest_move_m(const pal_body *body)
+{
+    double most = 0;
+    for (int i = 0; i < body->n_node; i++) {
+        double d2 = 0;
+        for (int c = 0; c < 3; c++) d2 += pow(body->x[3 * i + c] - body->x_rest[3 * i + c], 2);
+        most = fmax(most, d2);
+    }
+    return sqrt(most);
+}
+
+static pal_err run_live(const job *j, pal_table *r, pal_diagnostic *diag)
+{
+    static double ms[STEPS_MAX];
+    static pal_scene scene;
+    pal_world *world = NULL;
+    double mean_cg = 0, max_cg = 0, move_m = 0, began = pal_clock_s();
+    pal_err err = make_scene(j, &scene, diag);
+    if (!err) err = pal_world_create(&scene, diag, &world);
+    if (err) return err;
+    const double made = pal_clock_s();
+    const pal_body *body = pal_world_body(world, 0);
+    const int n = body->n_node > 10000 ? STEPS_MAX / 2 : STEPS_MAX, half = (int)lround(0.25 / j->step_s);
+    for (int i = -1; i < n && !err; i++) {
+        if (i >= 0 && i % half == 0) err = pull(world, j, i / half % 2 ? 0 : 2e-3);
+        double step_ms = 0;
+        if (!err) err = bench_step(world, j->step_s, &step_ms);
+        pal_solve_report report;
+        if (err || i < 0) continue;
+        pal_world_solve_report(world, 0, &report);
+        ms[i] = step_ms, mean_cg += (double)report.n_cg / n, max_cg = fmax(max_cg, report.n_cg);
+        move_m = fmax(move_m, largest_move_m(body));
+    }
+    if (!err) {
+        const double p50_ms = pal_median(ms, n);
+        TABLE_ROW(r, NUMBER("nodes", "nodes", 6, 0, body->n_node), TEXT("solver", "solver", -14, j->solver),
+                  TEXT("preconditioner", "preconditioner", -14, j->kind), NUMBER("young_Pa", "E Pa", 7, 0, j->young_Pa),
+                  NUMBER("make_s", "make s", 7, 3, made - began), NUMBER("p50_ms", "ms p50", 8, 3, p50_ms),
+                  NUMBER("p95_ms", "ms p95", 8, 3, ms[n * 95 / 100]), NUMBER("cg_mean", "CG mean", 7, 1, mean_cg),
+                  NUMBER("cg_max", "CG max", 6, 0, max_cg), NUMBER("move_mm", "moves mm", 8, 2, 1e3 * move_m));
+    }
+    pal_world_destroy(world);
+    return err;
+}
+
+static pal_err run_static(const job *j, pal_table *r, pal_diagnostic *diag)
+{
+    static pal_scene scene;
+    pal_world *world = NULL;
+    double step_ms = 0, began = pal_clock_s();
+    pal_err err = make_scene(j, &scene, diag);
+    if (!err) err = pal_entry_put_number(&scene.body[0].solver, "tolerance", 1e-6, diag);
+    if (!err) err = pal_entry_put_text(&scene.body[0].model, "law", "linear", diag);
+    if (!err) err = pal_world_create(&scene, diag, &world);
+    const double made = pal_clock_s();
+    if (!err) err = pull(world, j, 2e-3);
+    if (!err) err = bench_step(world, j->step_s, &step_ms);
+    if (!err) {
+        const pal_body *body = pal_world_body(world, 0);
+        pal_solve_report report;
+        pal_world_solve_report(world, 0, &report);
+        TABLE_ROW(r, NUMBER("nodes", "nodes", 6, 0, body->n_node), TEXT("linear", "linear", -14, j->kind),
+                  NUMBER("make_s", "make s", 7, 3, made - began), NUMBER("solve_ms", "solve ms", 8, 1, step_ms),
+                  NUMBER("cg", "CG", 5, 0, report.n_cg), NUMBER("residual", "residual", 10, 9, report.residual),
+                  NUMBER("move_mm", "moves mm", 9, 4, 1e3 * largest_move_m(body)),
+                  TEXT("converged", "converged", 9, report.converged ? "yes" : "no"));
+    }
+    pal_world_destroy(world);
+    return err;
+}
+
+pal_err bench_organ(pal_table *r, pal_diagnostic *diag)
+{
+    static const int size[] = {1300, 2700, 6900, 15770, 60000};
+    static const char *const kind[] = {"auto", "factor", "multigrid", "jacobi"}, *const linear[] = {"multigrid",
+                                                                                                    "incomplete",
+                                                                                                    "direct"};
+    const pal_mesh_file_options options = {.weld = 0};
+    pal_surface surface = {0};
+    pal_err err = r->argument ? pal_mesh_file_read(r->argument, &options, &surface, NULL, NULL, NULL, diag)
+                              : pal_organ_make(50000, &surface);
+    pal_table_list(r, "live");
+    for (int s = 0; s < 5 && !err; s++) {
+        job j = {.solver = "implicit_euler", .step_s = 1.0 / 60};
+        err = make_body(&surface, size[s], &j.mesh, diag);
+        for (int k = 0; k < 8 && !err; k++) {
+            j.kind = kind[k % 4], j.young_Pa = k < 4 ? 5e3 : 1e5;
+            if (k % 4 != 1 || j.mesh.tets.n_node < 10000) err = run_live(&j, r, diag);
+        }
+        pal_prepared_free(&j.mesh);
+    }
+    pal_table_note(r, "static, linear law, to 1e-6:");
+    pal_table_list(r, "static");
+    for (int s = 2; s < 5 && !err; s++) {
+        job j = {.solver = "static_newton", .step_s = 1.0 / 60, .young_Pa = 1e5};
+        err = make_body(&surface, size[s], &j.mesh, diag);
+        for (int k = 0; k < 3 && !err; k++) {
+            j.kind = linear[k];
+            if (k != 2 || j.mesh.tets.n_node < 20000) err = run_static(&j, r, diag);
+        }
+        pal_prepared_free(&j.mesh);
+    }
+    pal_surface_free(&surface);
+    return err;
+}

@@ -1,0 +1,191 @@
+/* Groups of cells, level by level. */
+#include "server/mesh/volume/cell_hierarchy.h"
+
+#include "server/base/heap.h"
+#include "server/num/union_find.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* a finer cell in the order of blocks */
+typedef struct entry {
+    int32_t block[3], cell;
+} entry;
+
+static int compare_entries(const void *pa, const void *pb)
+{
+    const entry *a = pa, *b = pb;
+    for (int axis = 2; axis >= 0; axis--)
+        if (a->block[axis] != b->block[axis]) return a->block[axis] < b->block[axis] ? -1 : 1;
+    return a->cell < b->cell ? -1 : a->cell > b->cell;
+}
+
+static bool same_block(const entry *a, const entry *b)
+{
+    return a->block[0] == b->block[0] && a->block[1] == b->block[1] && a->block[2] == b->block[2];
+}
+
+/* a finer level, and what is found of the coarser one */
+typedef struct work {
+    pal_lattice_cells from;
+    entry *entry;    /* [n_cell] */
+    int32_t *group;  /* coarse cell of each finer cell [n_cell] */
+    int32_t *corner; /* corners of coarse cells that nodes are interpolated from, by the parity of the node: bit of each
+                        axis along which it lies between two; -1: none [n_node][8] */
+    int32_t *root;   /* node of each corner of a coarse cell [n_coarse][8] */
+    int n_coarse;
+} work;
+
+static bool share_node(const work *w, int32_t a, int32_t b)
+{
+    for (int c = 0; c < 8; c++)
+        for (int d = 0; d < 8; d++)
+            if (w->from.node[8 * (size_t)a + (size_t)c] == w->from.node[8 * (size_t)b + (size_t)d]) return true;
+    return false;
+}
+
+/* numbers the groups of the cells first to end of one block, from the smallest cell of each */
+static void group_block(work *w, const entry *first, const entry *end)
+{
+    for (const entry *e = first; e < end; e++) w->group[e->cell] = -1;
+    for (const entry *e = first; e < end; e++) {
+        if (w->group[e->cell] >= 0) continue;
+        w->group[e->cell] = w->n_coarse;
+        for (bool grown = true; grown;) {
+            grown = false;
+            for (const entry *a = first; a < end; a++)
+                for (const entry *b = first; b < end && w->group[a->cell] < 0; b++)
+                    if (w->group[b->cell] == w->n_coarse && share_node(w, a->cell, b->cell))
+                        w->group[a->cell] = w->n_coarse, grown = true;
+        }
+        w->n_coarse++;
+    }
+}
+
+/* Corner `corner` of the cell at `octant` of a coarse cell lies between corners of it: calls of visit(k) with the index
+ * k among those and the corner d of the coarse cell */
+static int coarse_corner(int octant, int corner, int k)
+{
+    int d = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        const int at = (octant >> axis & 1) + (corner >> axis & 1); /* 0, 1, 2 halves of the coarse cell */
+        if (at != 1 && k >> axis & 1) return -1;
+        d |= (at == 1 ? k >> axis & 1 : at / 2) << axis;
+    }
+    return d;
+}
+
+/* corners of coarse cells that one node of the finer level is interpolated from are one */
+static void join_corners(work *w, const uint8_t *octant)
+{
+    pal_union_find_init(w->root, 8 * w->n_coarse);
+    for (int i = 0; i < 8 * w->from.n_node; i++) w->corner[i] = -1;
+    for (int e = 0; e < w->from.n_cell; e++)
+        for (int c = 0; c < 8; c++)
+            for (int k = 0; k < 8; k++) {
+                const int d = coarse_corner(octant[e], c, k);
+                if (d < 0) continue;
+                int32_t *seen = &w->corner[8 * (size_t)w->from.node[8 * (size_t)e + (size_t)c] + (size_t)k];
+                const int32_t here = 8 * w->group[e] + d;
+                if (*seen < 0)
+                    *seen = here;
+                else
+                    pal_union_find_join(w->root, *seen, here);
+            }
+}
+
+/* children of each coarse cell */
+static pal_err list_children(const work *w, pal_arena *arena, pal_grid_level *out)
+{
+    out->n_cell = w->n_coarse;
+    out->child = PAL_NEW(arena, int32_t, w->from.n_cell);
+    out->first = PAL_NEW(arena, int32_t, w->n_coarse + 2);
+    if (!out->child || !out->first) return PAL_ERR_MEMORY;
+    for (int e = 0; e < w->from.n_cell; e++) out->first[w->group[e] + 2]++;
+    for (int g = 0; g < w->n_coarse; g++) out->first[g + 2] += out->first[g + 1];
+    for (int e = 0; e < w->from.n_cell; e++) out->child[out->first[w->group[e] + 1]++] = e;
+    return PAL_ERR_OK;
+}
+
+/* interpolation, corners of cells, nodes that no free node uses */
+static pal_err fill_nodes(work *w, pal_arena *arena, pal_grid_level *out)
+{
+    const int n = w->from.n_node;
+    out->n_node = pal_union_find_label(w->root, 8 * w->n_coarse);
+    out->node = PAL_NEW(arena, int32_t, 8 * (size_t)w->n_coarse);
+    out->fixed = PAL_NEW(arena, uint8_t, out->n_node);
+    out->start = PAL_NEW(arena, int32_t, n + 1);
+    if (!out->node || !out->fixed || !out->start) return PAL_ERR_MEMORY;
+    memcpy(out->node, w->root, sizeof *out->node * 8 * (size_t)w->n_coarse);
+    int32_t n_from = 0;
+    for (int i = 0; i < n; i++) {
+        for (int k = 0; k < 8; k++) n_from += !w->from.fixed[i] && w->corner[8 * i + k] >= 0;
+        out->start[i + 1] = n_from;
+    }
+    out->from = PAL_NEW(arena, int32_t, n_from);
+    if (!out->from) return PAL_ERR_MEMORY;
+    memset(out->fixed, 1, (size_t)out->n_node);
+    n_from = 0;
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < 8; k++) {
+            if (w->from.fixed[i] || w->corner[8 * i + k] < 0) continue;
+            out->from[n_from] = w->root[w->corner[8 * i + k]];
+            out->fixed[out->from[n_from++]] = 0;
+        }
+    return PAL_ERR_OK;
+}
+
+/* place [n_coarse][3], heap, of the coarse cells */
+static pal_err coarsen(work *w, pal_arena *arena, pal_grid_level *out, int32_t **place)
+{
+    const pal_lattice_cells *from = &w->from;
+    pal_err err = PAL_ERR_OK;
+    PAL_ARRAY(&err, w->entry, from->n_cell);
+    PAL_ARRAY(&err, w->group, from->n_cell);
+    PAL_ARRAY(&err, w->corner, 8 * (size_t)from->n_node);
+    if (err) return err;
+    out->octant = PAL_NEW(arena, uint8_t, from->n_cell);
+    if (!out->octant) return PAL_ERR_MEMORY;
+    for (int e = 0; e < from->n_cell; e++) {
+        const int32_t *at = from->place + 3 * (size_t)e;
+        w->entry[e] = (entry){.block = {at[0] / 2, at[1] / 2, at[2] / 2}, .cell = e};
+        out->octant[e] = (uint8_t)((at[0] & 1) + 2 * (at[1] & 1) + 4 * (at[2] & 1));
+    }
+    qsort(w->entry, (size_t)from->n_cell, sizeof *w->entry, compare_entries);
+    const entry *end = w->entry + from->n_cell;
+    for (const entry *e = w->entry, *next; e < end; e = next) {
+        for (next = e + 1; next < end && same_block(e, next); next++) {
+        }
+        group_block(w, e, next);
+    }
+    PAL_ARRAY(&err, *place, 3 * (size_t)w->n_coarse + 1);
+    PAL_ARRAY(&err, w->root, 8 * (size_t)w->n_coarse + 1);
+    if (err) return err;
+    for (int e = 0; e < from->n_cell; e++)
+        memcpy(*place + 3 * (size_t)w->group[w->entry[e].cell], w->entry[e].block, sizeof w->entry[e].block);
+    join_corners(w, out->octant);
+    PAL_TRY(list_children(w, arena, out));
+    return fill_nodes(w, arena, out);
+}
+
+pal_err pal_cell_hierarchy_make(const pal_lattice_cells *cells, int n_coarsest, pal_arena *arena,
+                                pal_grid_hierarchy *out)
+{
+    work w = {.from = *cells};
+    int32_t *place = NULL;
+    pal_err err = PAL_ERR_OK;
+    out->n_level = 0;
+    while (!err && out->n_level < PAL_GRID_LEVELS_MAX && w.from.n_node > n_coarsest) {
+        pal_grid_level *level = &out->level[out->n_level];
+        int32_t *coarse = NULL;
+        w.n_coarse = 0;
+        err = coarsen(&w, arena, level, &coarse);
+        free(w.entry), free(w.group), free(w.corner), free(w.root), free(place);
+        place = coarse;
+        if (err || level->n_node >= w.from.n_node) break;
+        w = (work){.from = {level->n_cell, level->n_node, level->node, place, level->fixed}};
+        out->n_level++;
+    }
+    free(place);
+    return err;
+}

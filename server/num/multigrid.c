@@ -1,0 +1,419 @@
+/* Levels of cells as a preconditioner. */
+#include "server/num/multigrid.h"
+
+#include "server/num/cholesky.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+const float pal_chebyshev_weight[PAL_CHEBYSHEV_DEGREE] = {1.00842544782028f, 1.08867839208730f, 1.33753125909618f};
+
+/* products of the power iteration that finds a largest eigenvalue (tests/num/test_multigrid.c: within a tenth) */
+enum { POWER_ITERATIONS = 15 };
+/* relative shift of the coarsest diagonal: interpolation may lose rank at supports (tests/num/test_multigrid.c) */
+#define COARSEST_SHIFT 1e-5
+
+typedef float vec4 __attribute__((vector_size(16)));
+
+/* x y z 0 of a node; the columns of a block */
+typedef struct matrix {
+    int n;
+    int32_t *start, *column; /* full rows, columns ascending [n + 1] [start[n]] */
+    vec4 (*value)[3];        /* blocks, column by column [start[n]] */
+    float *inverse;          /* 1 / D, 0 at fixed nodes [n] */
+    float lambda;            /* no eigenvalue of D^-1 A is larger */
+    vec4 *x, *b, *d, *r;     /* answer, right side, direction, residual [n] */
+} matrix;
+
+struct pal_multigrid {
+    const pal_grid_hierarchy *grid;
+    int n_level;
+    matrix level[PAL_GRID_LEVELS_MAX];
+    pal_arena *arena;
+    pal_block_matrix coarsest;
+    pal_cholesky *factor;
+    double *vector; /* of the coarsest level [n][3] */
+    int32_t *place; /* blocks of a row by their columns, -1: none */
+};
+
+/* ---- patterns ---- */
+
+/* cells around each node: list [start[n]], heap */
+static int32_t *cells_of_nodes(const pal_grid_level *grid, int32_t **list)
+{
+    int32_t *start = calloc((size_t)grid->n_node + 2, sizeof *start);
+    *list = malloc(sizeof **list * (8 * (size_t)grid->n_cell + 1));
+    if (!start || !*list) {
+        free(start), free(*list);
+        return NULL;
+    }
+    for (int k = 0; k < 8 * grid->n_cell; k++) start[grid->node[k] + 2]++;
+    for (int i = 0; i < grid->n_node; i++) start[i + 2] += start[i + 1];
+    for (int k = 0; k < 8 * grid->n_cell; k++) (*list)[start[grid->node[k] + 1]++] = k / 8;
+    return start;
+}
+
+static int compare_numbers(const void *a, const void *b)
+{
+    const int32_t i = *(const int32_t *)a, j = *(const int32_t *)b;
+    return (i > j) - (i < j);
+}
+
+/* neighbours of node i in ascending order; returns their number */
+static int neighbours(const pal_grid_level *grid, const int32_t *start, const int32_t *list, int i, int32_t *mark,
+                      int32_t *to)
+{
+    int n = 0;
+    for (int32_t k = start[i]; k < start[i + 1]; k++)
+        for (int c = 0; c < 8; c++) {
+            int32_t j = grid->node[8 * (size_t)list[k] + (size_t)c];
+            if (mark[j] == i) continue;
+            mark[j] = i;
+            to[n++] = j;
+        }
+    qsort(to, (size_t)n, sizeof *to, compare_numbers);
+    return n;
+}
+
+static pal_err make_pattern(const pal_grid_level *grid, pal_arena *arena, matrix *out)
+{
+    int32_t *list, *start = cells_of_nodes(grid, &list);
+    if (!start) return PAL_ERR_MEMORY;
+    int n = out->n = grid->n_node;
+    int32_t *mark = malloc(sizeof *mark * ((size_t)n + 1)), *near = malloc(sizeof *near * ((size_t)n + 1));
+    out->start = PAL_NEW(arena, int32_t, n + 1);
+    bool made = mark && near && out->start;
+    for (int i = 0; i < n && made; i++) mark[i] = -1;
+    for (int i = 0; i < n && made; i++)
+        out->start[i + 1] = out->start[i] + neighbours(grid, start, list, i, mark, near);
+    if (made) out->column = PAL_NEW(arena, int32_t, out->start[n]);
+    made = made && out->column;
+    for (int i = 0; i < n && made; i++) mark[i] = -1;
+    for (int i = 0; i < n && made; i++) neighbours(grid, start, list, i, mark, out->column + out->start[i]);
+    free(start), free(list), free(mark), free(near);
+    return made ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+static pal_err make_level(const pal_grid_level *grid, pal_arena *arena, matrix *out)
+{
+    PAL_TRY(make_pattern(grid, arena, out));
+    size_t n = (size_t)out->n;
+    out->value = pal_arena_array(arena, (size_t)out->start[n], sizeof *out->value);
+    out->inverse = PAL_NEW(arena, float, n);
+    out->x = PAL_NEW(arena, vec4, n), out->b = PAL_NEW(arena, vec4, n);
+    out->d = PAL_NEW(arena, vec4, n), out->r = PAL_NEW(arena, vec4, n);
+    return out->value && out->inverse && out->x && out->b && out->d && out->r ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+static pal_err make(pal_multigrid *mg)
+{
+    const pal_grid_hierarchy *grid = mg->grid;
+    const pal_grid_level *last = &grid->level[grid->n_level - 1];
+    mg->arena = pal_arena_create(1 << 16, true);
+    if (!mg->arena) return PAL_ERR_MEMORY;
+    mg->n_level = grid->n_level;
+    int n_row = 1;
+    for (int k = 0; k < mg->n_level; k++) {
+        PAL_TRY(make_level(&grid->level[k], mg->arena, &mg->level[k]));
+        if (k > 0 && mg->level[k].n > n_row) n_row = mg->level[k].n;
+    }
+    mg->place = PAL_NEW(mg->arena, int32_t, n_row);
+    mg->vector = PAL_NEW(mg->arena, double, 3 * (size_t)last->n_node);
+    if (!mg->place || !mg->vector) return PAL_ERR_MEMORY;
+    for (int i = 0; i < n_row; i++) mg->place[i] = -1;
+    const pal_cliques cells = {.n_item = last->n_cell, .n_corner = 8, .node = last->node};
+    PAL_TRY(pal_block_matrix_make(last->n_node, &cells, 1, mg->arena, &mg->coarsest));
+    return pal_cholesky_create(&mg->coarsest, last->fixed, &mg->factor);
+}
+
+pal_err pal_multigrid_create(const pal_grid_hierarchy *grid, pal_multigrid **out)
+{
+    pal_multigrid *mg = *out = calloc(1, sizeof *mg);
+    if (!mg) return PAL_ERR_MEMORY;
+    mg->grid = grid;
+    pal_err err = make(mg);
+    if (err) {
+        pal_multigrid_destroy(mg);
+        *out = NULL;
+    }
+    return err;
+}
+
+void pal_multigrid_destroy(pal_multigrid *mg)
+{
+    if (!mg) return;
+    pal_cholesky_destroy(mg->factor);
+    pal_arena_destroy(mg->arena);
+    free(mg);
+}
+
+size_t pal_multigrid_bytes(const pal_multigrid *mg)
+{
+    return pal_arena_used(mg->arena) + 4 * (size_t)pal_cholesky_nonzeros(mg->factor);
+}
+
+/* ---- values ---- */
+
+static int find(const matrix *a, int i, int32_t j)
+{
+    int low = a->start[i], high = a->start[i + 1] - 1;
+    while (low < high) {
+        int middle = (low + high) / 2;
+        if (a->column[middle] < j)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+void pal_multigrid_zero(pal_multigrid *mg)
+{
+    memset(mg->level[0].value, 0, sizeof *mg->level[0].value * (size_t)mg->level[0].start[mg->level[0].n]);
+}
+
+void pal_multigrid_add_cell(pal_multigrid *mg, int cell, double k[24][24])
+{
+    matrix *to = &mg->level[0];
+    const int32_t *node = mg->grid->level[0].node + 8 * (size_t)cell;
+    for (int c = 0; c < 8; c++)
+        for (int d = 0; d < 8; d++) {
+            vec4 *block = to->value[find(to, node[c], node[d])];
+            for (int j = 0; j < 3; j++)
+                for (int i = 0; i < 3; i++) block[j][i] += (float)k[3 * c + i][3 * d + j];
+        }
+}
+
+void pal_multigrid_add_mass(pal_multigrid *mg, int finest_node, double mass)
+{
+    matrix *to = &mg->level[0];
+    const pal_grid_level *grid = &mg->grid->level[0];
+    const int32_t *from = grid->from + grid->start[finest_node];
+    const int n = grid->start[finest_node + 1] - grid->start[finest_node];
+    for (int c = 0; c < n; c++)
+        for (int d = 0; d < n; d++) {
+            vec4 *block = to->value[find(to, from[c], from[d])];
+            for (int i = 0; i < 3; i++) block[i][i] += (float)(mass / (n * n));
+        }
+}
+
+/* rows of finer nodes by the coarse nodes that they are interpolated from: list [first[n_coarse]], heap */
+static int32_t *transpose(const pal_grid_level *grid, int n_finer, int32_t **list)
+{
+    int32_t *first = calloc((size_t)grid->n_node + 2, sizeof *first);
+    *list = malloc(sizeof **list * ((size_t)grid->start[n_finer] + 1));
+    if (!first || !*list) {
+        free(first), free(*list);
+        return NULL;
+    }
+    for (int32_t k = 0; k < grid->start[n_finer]; k++) first[grid->from[k] + 2]++;
+    for (int i = 0; i < grid->n_node; i++) first[i + 2] += first[i + 1];
+    for (int i = 0; i < n_finer; i++)
+        for (int32_t k = grid->start[i]; k < grid->start[i + 1]; k++) (*list)[first[grid->from[k] + 1]++] = i;
+    return first;
+}
+
+static float weight(const pal_grid_level *grid, int32_t finer)
+{
+    return 1 / (float)(grid->start[finer + 1] - grid->start[finer]);
+}
+
+/* coarse = P' finer P, row by row */
+static pal_err coarsen(pal_multigrid *mg, int level)
+{
+    const matrix *from = &mg->level[level - 1];
+    const pal_grid_level *grid = &mg->grid->level[level];
+    matrix *to = &mg->level[level];
+    int32_t *list, *first = transpose(grid, from->n, &list);
+    if (!first) return PAL_ERR_MEMORY;
+    memset(to->value, 0, sizeof *to->value * (size_t)to->start[to->n]);
+    for (int i = 0; i < to->n; i++) {
+        for (int32_t k = to->start[i]; k < to->start[i + 1]; k++) mg->place[to->column[k]] = k;
+        for (int32_t f = first[i]; f < first[i + 1]; f++)
+            for (int32_t k = from->start[list[f]]; k < from->start[list[f] + 1]; k++) {
+                const int32_t j = from->column[k];
+                const float w = grid->start[j] < grid->start[j + 1] ? weight(grid, list[f]) * weight(grid, j) : 0;
+                for (int32_t m = grid->start[j]; m < grid->start[j + 1]; m++)
+                    for (int c = 0; c < 3; c++) to->value[mg->place[grid->from[m]]][c] += w * from->value[k][c];
+            }
+        for (int32_t k = to->start[i]; k < to->start[i + 1]; k++) mg->place[to->column[k]] = -1;
+    }
+    free(first), free(list);
+    return PAL_ERR_OK;
+}
+
+static pal_err factor_coarsest(pal_multigrid *mg)
+{
+    const matrix *from = &mg->level[mg->n_level - 1];
+    pal_block_matrix *to = &mg->coarsest;
+    for (int j = 0; j < to->n; j++)
+        for (int32_t k = to->start[j]; k < to->start[j + 1]; k++) {
+            const vec4 *block = from->value[find(from, to->row[k], j)];
+            for (int r = 0; r < 3; r++)
+                for (int c = 0; c < 3; c++)
+                    to->value[9 * (size_t)k + (size_t)(3 * r + c)] =
+                        (double)block[c][r] * (to->row[k] == j && r == c ? 1 + COARSEST_SHIFT : 1);
+        }
+    return pal_cholesky_factor(mg->factor, to, true);
+}
+
+/* ---- smoothing ---- */
+
+/* out = b - A x, or A x without b */
+static void multiply(const matrix *a, const vec4 *b, const vec4 *x, vec4 *out)
+{
+    for (int i = 0; i < a->n; i++) {
+        vec4 sum = {0}, other = {0};
+        for (int32_t k = a->start[i]; k < a->start[i + 1]; k++) {
+            const vec4 *block = a->value[k], at = x[a->column[k]];
+            sum += block[0] * at[0] + block[1] * at[1];
+            other += block[2] * at[2];
+        }
+        out[i] = b ? b[i] - (sum + other) : sum + other;
+    }
+}
+
+/* x = the smoother's answer, from 0 or from x */
+static void smooth(matrix *a, bool from_zero)
+{
+    const float first = 4 / (3 * a->lambda);
+    if (from_zero)
+        memcpy(a->r, a->b, sizeof *a->r * (size_t)a->n);
+    else
+        multiply(a, a->b, a->x, a->r);
+    for (int i = 0; i < a->n; i++) {
+        a->d[i] = first * a->inverse[i] * a->r[i];
+        a->x[i] = pal_chebyshev_weight[0] * a->d[i] + (from_zero ? (vec4){0} : a->x[i]);
+    }
+    for (int k = 1; k < PAL_CHEBYSHEV_DEGREE; k++) {
+        const float keep = pal_chebyshev_keep(k), take = pal_chebyshev_take(k) / a->lambda;
+        multiply(a, a->r, a->d, a->r);
+        for (int i = 0; i < a->n; i++) {
+            a->d[i] = keep * a->d[i] + take * a->inverse[i] * a->r[i];
+            a->x[i] += pal_chebyshev_weight[k] * a->d[i];
+        }
+    }
+}
+
+/* the norm sqrt(d' D d), in which D^-1 A is symmetric */
+static double size_of_direction(const matrix *a)
+{
+    double sum = 0;
+    for (int i = 0; i < a->n; i++)
+        for (int c = 0; c < 3 && a->inverse[i] > 0; c++) sum += (double)(a->d[i][c] * a->d[i][c] / a->inverse[i]);
+    return sqrt(sum);
+}
+
+/* diagonal and largest eigenvalue */
+static void measure(matrix *a, const uint8_t *fixed)
+{
+    for (int i = 0; i < a->n; i++) {
+        const vec4 *block = a->value[find(a, i, i)];
+        float d = (block[0][0] + block[1][1] + block[2][2]) / 3;
+        a->inverse[i] = !fixed[i] && d > 0 ? 1 / d : 0;
+        /* any vector that is not smooth */
+        for (int c = 0; c < 3; c++) a->d[i][c] = a->inverse[i] > 0 ? (float)((7 * i + 3 * c) % 11 - 5) : 0;
+    }
+    double lambda = 1, size = size_of_direction(a);
+    for (int k = 0; k < POWER_ITERATIONS && size > 0 && isfinite(size); k++) {
+        for (int i = 0; i < a->n; i++) a->d[i] *= (float)(1 / size);
+        multiply(a, NULL, a->d, a->r);
+        for (int i = 0; i < a->n; i++) a->d[i] = a->inverse[i] * a->r[i];
+        lambda = size = size_of_direction(a);
+    }
+    a->lambda = (float)(PAL_CHEBYSHEV_SAFE * lambda);
+}
+
+pal_err pal_multigrid_finish(pal_multigrid *mg)
+{
+    for (int k = 1; k < mg->n_level; k++) PAL_TRY(coarsen(mg, k));
+    for (int k = 0; k < mg->n_level - 1; k++) measure(&mg->level[k], mg->grid->level[k].fixed);
+    return factor_coarsest(mg);
+}
+
+/* ---- cycle ---- */
+
+float *pal_multigrid_right_side(pal_multigrid *mg)
+{
+    return (float *)mg->level[0].b;
+}
+const float *pal_multigrid_answer(const pal_multigrid *mg)
+{
+    return (const float *)mg->level[0].x;
+}
+
+static void solve_coarsest(pal_multigrid *mg, matrix *a)
+{
+    double *v = mg->vector;
+    for (int i = 0; i < a->n; i++)
+        for (int c = 0; c < 3; c++) v[3 * i + c] = (double)a->b[i][c];
+    if (pal_cholesky_solve(mg->factor, v, v)) memset(v, 0, 3 * sizeof *v * (size_t)a->n);
+    for (int i = 0; i < a->n; i++) a->x[i] = (vec4){(float)v[3 * i], (float)v[3 * i + 1], (float)v[3 * i + 2], 0};
+}
+
+static void cycle(pal_multigrid *mg, int k)
+{
+    matrix *a = &mg->level[k];
+    if (k == mg->n_level - 1) {
+        solve_coarsest(mg, a);
+        return;
+    }
+    const pal_grid_level *grid = &mg->grid->level[k + 1];
+    matrix *coarse = &mg->level[k + 1];
+    smooth(a, true);
+    multiply(a, a->b, a->x, a->r);
+    memset(coarse->b, 0, sizeof *coarse->b * (size_t)coarse->n);
+    for (int i = 0; i < a->n; i++) {
+        if (grid->start[i] == grid->start[i + 1]) continue;
+        const vec4 part = weight(grid, i) * a->r[i];
+        for (int32_t m = grid->start[i]; m < grid->start[i + 1]; m++) coarse->b[grid->from[m]] += part;
+    }
+    cycle(mg, k + 1);
+    for (int i = 0; i < a->n; i++) {
+        if (grid->start[i] == grid->start[i + 1]) continue;
+        vec4 sum = {0};
+        for (int32_t m = grid->start[i]; m < grid->start[i + 1]; m++) sum += coarse->x[grid->from[m]];
+        a->x[i] += weight(grid, i) * sum;
+    }
+    smooth(a, false);
+}
+
+void pal_multigrid_cycle(pal_multigrid *mg)
+{
+    cycle(mg, 0);
+}
+
+/* ---- cells ---- */
+
+/* weights of the corners of a cell at the corners of its part at `octant` */
+static void corner_weights(int octant, double w[8][8])
+{
+    for (int c = 0; c < 8; c++)
+        for (int d = 0; d < 8; d++) {
+            w[c][d] = 1;
+            for (int axis = 0; axis < 3; axis++) {
+                double at = 0.5 * ((octant >> axis & 1) + (c >> axis & 1));
+                w[c][d] *= d >> axis & 1 ? at : 1 - at;
+            }
+        }
+}
+
+void pal_multigrid_coarsen_cell(double k[24][24], int octant, unsigned fixed, double to[24][24])
+{
+    double w[8][8], part[24][24] = {{0}};
+    corner_weights(octant, w);
+    for (int c = 0; c < 8; c++)
+        for (int d = 0; d < 8; d++)
+            for (int e = 0; e < 8; e++) {
+                if (w[d][e] == 0 || fixed >> d & 1 || fixed >> c & 1) continue;
+                for (int i = 0; i < 3; i++)
+                    for (int j = 0; j < 3; j++) part[3 * c + i][3 * e + j] += k[3 * c + i][3 * d + j] * w[d][e];
+            }
+    for (int c = 0; c < 8; c++)
+        for (int d = 0; d < 8; d++) {
+            if (w[c][d] == 0) continue;
+            for (int i = 0; i < 3; i++)
+                for (int j = 0; j < 24; j++) to[3 * d + i][j] += w[c][d] * part[3 * c + i][j];
+        }
+}

@@ -1,0 +1,71 @@
+/* Geometric multigrid on levels of cells, as a preconditioner in single precision: Galerkin matrices of 3x3 blocks on
+ * every level, Chebyshev smoothing, one V-cycle, and a Cholesky factor of the coarsest level.
+ *
+ * A coarse cell is a connected group of the cells in a block of 2 x 2 x 2 (composite elements: Dick, Georgii,
+ * Westermann 2011), so that parts that a cut separates stay apart on every level. The finest level, on which the caller
+ * smooths without a matrix, is not kept here; its interpolation from the first level is level[0].start and from. The
+ * smoother is the optimised Chebyshev iteration of the fourth kind of degree 3 on D^-1 A (Lottes 2022; Phillips and
+ * Fischer 2022), D a third of the trace of each diagonal block. Memory: heap, freed by destroy; no heap call in a
+ * cycle. Thread: [load] to make, then one thread at a time. */
+#ifndef PAL_NUM_MULTIGRID_H
+#define PAL_NUM_MULTIGRID_H
+#include "server/base/err.h"
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* Chebyshev iteration of degree 3: weights of the directions (Phillips and Fischer 2022), and the factor that keeps an
+ * estimated largest eigenvalue on the safe side */
+enum { PAL_CHEBYSHEV_DEGREE = 3 };
+extern const float pal_chebyshev_weight[PAL_CHEBYSHEV_DEGREE];
+#define PAL_CHEBYSHEV_SAFE 1.1
+/* d = keep d + take D^-1 r / lambda in step i of the iteration */
+static inline float pal_chebyshev_keep(int i)
+{
+    return (float)(2 * i - 1) / (float)(2 * i + 3);
+}
+static inline float pal_chebyshev_take(int i)
+{
+    return (float)(8 * i + 4) / (float)(2 * i + 3);
+}
+
+/* one level of coarse cells, and what the next finer one is on it */
+typedef struct pal_grid_level {
+    int n_cell, n_node;
+    int32_t *node;   /* corners of each cell, x = 1, y = 2, z = 4                              [n_cell][8]      */
+    uint8_t *fixed;  /* no free node of the finer level takes part in it                       [n_node]         */
+    int32_t *child;  /* finer cells, sorted by the cell that contains them                     [n_finer_cell]   */
+    int32_t *first;  /* first child of each cell                                               [n_cell + 1]     */
+    uint8_t *octant; /* place of each finer cell in its cell, bits as of corners               [n_finer_cell]   */
+    int32_t *start;  /* first entry in `from` of each finer node                               [n_finer_node + 1] */
+    int32_t *from;   /* nodes whose mean a finer node is; none: it is fixed */
+} pal_grid_level;
+enum { PAL_GRID_LEVELS_MAX = 12 };
+typedef struct pal_grid_hierarchy {
+    int n_level; /* 0: the finest level is coarse already */
+    pal_grid_level level[PAL_GRID_LEVELS_MAX];
+} pal_grid_hierarchy;
+
+typedef struct pal_multigrid pal_multigrid;
+
+/* makes patterns and vectors for a hierarchy of at least one level, which must outlive it. MEMORY. [load] */
+pal_err pal_multigrid_create(const pal_grid_hierarchy *grid, pal_multigrid **out);
+void pal_multigrid_destroy(pal_multigrid *mg); /* NULL is fine */
+size_t pal_multigrid_bytes(const pal_multigrid *mg);
+
+/* new values: zero, then add the first level's matrix cell by cell and the lumped masses of the finest nodes, then
+ * finish makes the coarser levels. NUMERIC: the coarsest matrix is not positive definite; MEMORY */
+void pal_multigrid_zero(pal_multigrid *mg);
+void pal_multigrid_add_cell(pal_multigrid *mg, int cell, double k[24][24]);
+void pal_multigrid_add_mass(pal_multigrid *mg, int finest_node, double mass);
+pal_err pal_multigrid_finish(pal_multigrid *mg);
+
+/* vectors of the first level, x y z 0 of each node: a cycle reads the right side and writes the answer [n_node][4] */
+float *pal_multigrid_right_side(pal_multigrid *mg);
+const float *pal_multigrid_answer(const pal_multigrid *mg);
+void pal_multigrid_cycle(pal_multigrid *mg); /* answer ~ A^-1 right side */
+
+/* k [24][24], a matrix of a finer cell in corners and axes, interpolated from the corners of the cell that contains it
+ * at `octant` and added to `to`; corners whose bits are set in `fixed` do not move */
+void pal_multigrid_coarsen_cell(double k[24][24], int octant, unsigned fixed, double to[24][24]);
+#endif

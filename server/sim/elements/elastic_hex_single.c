@@ -1,0 +1,115 @@
+/* Voxel hexahedra in single precision. */
+#include "server/sim/elements/elastic_hex_single.h"
+
+#include <string.h>
+
+typedef float pal_single8 __attribute__((vector_size(32)));
+typedef float pal_single8_memory __attribute__((vector_size(32), aligned(4), may_alias));
+#define HEX_VECTOR pal_single8
+#define HEX_REAL   float
+#include "server/sim/elements/elastic_hex_modes.h"
+
+pal_err pal_hex_single_make(const pal_elastic_hexes *cubes, const pal_node_order *node_order, pal_arena *arena,
+                            pal_elastic_hexes_single *out)
+{
+    const size_t n = PAL_LANES * (size_t)cubes->n_block;
+    *out = (pal_elastic_hexes_single){.cubes = cubes, .n_slot = node_order->n_slot};
+    out->stiff = PAL_NEW(arena, float, 2 * n);
+    if (cubes->law != PAL_LAW_LINEAR) out->rotation = PAL_NEW(arena, float, 9 * n);
+    return out->stiff && (out->rotation || cubes->law == PAL_LAW_LINEAR) ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+static const double *coefficients(const pal_elastic_hexes *cubes, int part)
+{
+    return cubes->recovery ? cubes->whole[part] : part == 0 ? cubes->mu : cubes->lambda;
+}
+
+void pal_hex_single_stiffen(pal_elastic_hexes_single *single, double k)
+{
+    for (int part = 0; part < 2; part++) {
+        const double *from = coefficients(single->cubes, part);
+        for (int b = 0; b < single->cubes->n_block; b++)
+            for (int l = 0; l < PAL_LANES; l++)
+                single->stiff[(2 * b + part) * PAL_LANES + l] = (float)(k * from[PAL_LANES * b + l]);
+    }
+}
+
+void pal_hex_single_rotate(pal_elastic_hexes_single *single)
+{
+    const size_t n = 9 * PAL_LANES * (size_t)single->cubes->n_block;
+    for (size_t i = 0; i < n && single->rotation; i++) single->rotation[i] = (float)single->cubes->rotation[i];
+}
+
+PAL_INLINE pal_single8 load(const float *at)
+{
+    return *(const pal_single8_memory *)at;
+}
+PAL_INLINE void add(float *at, pal_single8 a)
+{
+    *(pal_single8_memory *)at += a;
+}
+
+/* u = r u, or r' u, for all modes but translation */
+PAL_INLINE void turn(const pal_single8 r[9], bool transposed, pal_single8 u[3][8])
+{
+    const int row = transposed ? 1 : 3, column = transposed ? 3 : 1;
+    for (int m = 1; m < 8; m++) {
+        const pal_single8 a = u[0][m], b = u[1][m], c = u[2][m];
+        for (int i = 0; i < 3; i++) u[i][m] = r[row * i] * a + r[row * i + column] * b + r[row * i + 2 * column] * c;
+    }
+}
+
+/* u becomes k K u of the eight elements of a block */
+PAL_INLINE void multiply_block(const pal_elastic_hexes_single *single, int block, pal_single8 u[3][8])
+{
+    const float *beta = (const float[]){(float)single->cubes->beta[0], (float)single->cubes->beta[1]};
+    const pal_single8 mu = load(single->stiff + 2 * PAL_LANES * block),
+                      lambda = load(single->stiff + (2 * block + 1) * PAL_LANES);
+    pal_single8 r[9];
+    for (int i = 0; i < 3; i++) walsh(u[i]);
+    for (int i = 0; i < 9 && single->rotation; i++) r[i] = load(single->rotation + (9 * block + i) * PAL_LANES);
+    if (single->rotation) turn(r, true, u);
+    hex_stress(mu, lambda, beta[0] * mu + beta[1] * lambda, u);
+    if (single->rotation) turn(r, false, u);
+    for (int i = 0; i < 3; i++) unwalsh(u[i]);
+}
+
+void pal_hex_single_multiply(const pal_elastic_hexes_single *single, const float *p, float *out)
+{
+    const pal_simd_blocks *blocks = &single->cubes->simd_blocks;
+    const size_t n_slot = (size_t)single->n_slot;
+    for (int b = 0; b < blocks->n_strip; b++) {
+        const int32_t *base = blocks->base + 8 * b;
+        pal_single8 u[3][8];
+        for (size_t d = 0; d < 3; d++)
+            for (int c = 0; c < 8; c++) u[d][c] = load(p + d * n_slot + base[c]);
+        multiply_block(single, b, u);
+        for (size_t d = 0; d < 3; d++)
+            for (int c = 0; c < 8; c++) add(out + d * n_slot + base[c], u[d][c]);
+    }
+    for (int b = 0; b < blocks->n_loose; b++) {
+        const int32_t *node = blocks->node + 8 * PAL_LANES * b;
+        pal_single8 u[3][8];
+        for (size_t d = 0; d < 3; d++)
+            for (int c = 0; c < 8; c++)
+                for (int l = 0; l < PAL_LANES; l++) u[d][c][l] = p[d * n_slot + (size_t)node[PAL_LANES * c + l]];
+        multiply_block(single, blocks->n_strip + b, u);
+        for (size_t d = 0; d < 3; d++)
+            for (int c = 0; c < 8; c++)
+                for (int l = 0; l < PAL_LANES; l++) out[d * n_slot + (size_t)node[PAL_LANES * c + l]] += u[d][c][l];
+    }
+}
+
+void pal_hex_single_element(const pal_elastic_hexes *cubes, int e, double k, double to[24][24])
+{
+    const int lane = cubes->simd_blocks.place[e];
+    const double mu = k * coefficients(cubes, 0)[lane], lambda = k * coefficients(cubes, 1)[lane];
+    for (int c = 0; c < 8; c++)
+        for (int d = c; d < 8; d++)
+            for (int i = 0; i < 3; i++)
+                for (int j = 0; j < 3; j++) {
+                    const double *part = cubes->reference[pal_hex_pair(c, d)][0];
+                    to[3 * c + i][3 * d + j] = mu * part[3 * i + j] + lambda * part[9 + 3 * i + j];
+                    to[3 * d + j][3 * c + i] = to[3 * c + i][3 * d + j];
+                }
+}

@@ -1,0 +1,26 @@
+/* The corotational tangent R K R' of voxel hexahedra in single precision, for preconditioners: half the memory and
+ * twice the numbers in a register. Vectors are by slot (pal_node_order), [3][n_slot]. Elements in recovery from
+ * inversion have their elastic stiffness here. Memory: the caller's arena. Thread: [load] to make, then [sim]. */
+#ifndef PAL_SIM_ELEMENTS_ELASTIC_HEX_SINGLE_H
+#define PAL_SIM_ELEMENTS_ELASTIC_HEX_SINGLE_H
+#include "server/sim/elements/elastic_hex.h"
+
+typedef struct pal_elastic_hexes_single {
+    const pal_elastic_hexes *cubes;
+    int n_slot;
+    float *stiff;    /* mu, lambda times k and h / 16, N/m                   [n_block][2][8] */
+    float *rotation; /* [n_block][9][8]; NULL: the law is linear */
+} pal_elastic_hexes_single;
+
+/* MEMORY. [load] */
+pal_err pal_hex_single_make(const pal_elastic_hexes *cubes, const pal_node_order *node_order, pal_arena *arena,
+                            pal_elastic_hexes_single *out);
+/* takes the present material times k */
+void pal_hex_single_stiffen(pal_elastic_hexes_single *single, double k);
+/* takes the rotations of the last linearise */
+void pal_hex_single_rotate(pal_elastic_hexes_single *single);
+/* out += k K p; empty slots of p are 0 */
+void pal_hex_single_multiply(const pal_elastic_hexes_single *single, const float *p, float *out);
+/* K of element e at rest, k K [24][24] in corners and axes */
+void pal_hex_single_element(const pal_elastic_hexes *cubes, int e, double k, double to[24][24]);
+#endif

@@ -1,0 +1,37 @@
+/* Multigrid preconditioner of a body of voxel hexahedra (linear or corotational law): A = mass M + stiff K without
+ * contact. The finest level has no matrix: it multiplies in single precision with the present rotations, and smooths in
+ * place (num/multigrid.h has the smoother and the coarser levels). The coarser levels are those of the state at the
+ * last pal_hex_multigrid_update, warped to the present one (warp.h): z = W P A1^-1 P' W' r. Four to eight iterations of
+ * conjugate gradients to 1e-2 at any number of nodes (tests/sim/implicit/test_preconditioner.c). Memory: the caller's
+ * arena, and the heap for the coarser levels. Thread: [load] to make, then [sim]. */
+#ifndef PAL_SIM_IMPLICIT_HEX_MULTIGRID_H
+#define PAL_SIM_IMPLICIT_HEX_MULTIGRID_H
+#include "server/num/multigrid.h"
+#include "server/sim/elements/elastic_hex_single.h"
+#include "server/sim/implicit/warp.h"
+
+typedef struct pal_hex_multigrid {
+    const pal_body *body;
+    const pal_elastic_hexes *cubes;
+    pal_elastic_hexes_single single;
+    const pal_grid_hierarchy *grid;
+    pal_multigrid *coarse;
+    float lambda;             /* no eigenvalue of D^-1 A is larger */
+    double mass, stiff;       /* of the last update */
+    int n_group, n_slot;      /* groups of 8 slots with nodes */
+    int32_t *group;           /* first slot [n_group] */
+    float *weight, *inverse;  /* mass M; 1 / D, 0 at fixed nodes and empty slots [n_slot] */
+    float *x, *b, *d, *r, *q; /* answer, right side, direction, residual, product [3][n_slot] */
+} pal_hex_multigrid;
+
+/* levels of the body, shared by all its preconditioners; n_level 0: it is too small. MEMORY. [load] */
+pal_err pal_hex_grid_make(const pal_body *body, pal_arena *arena, pal_grid_hierarchy *out);
+pal_err pal_hex_multigrid_make(const pal_body *body, const pal_elastic_hexes *cubes, const pal_grid_hierarchy *grid,
+                               pal_arena *arena, pal_hex_multigrid *out);
+void pal_hex_multigrid_destroy(pal_hex_multigrid *mg);
+/* takes material and rotations of the last linearise. NUMERIC: not positive definite; MEMORY */
+pal_err pal_hex_multigrid_update(pal_hex_multigrid *mg, double mass, double stiff);
+void pal_hex_multigrid_rotate(pal_hex_multigrid *mg); /* takes the rotations of the last linearise, finest level */
+/* z ~ A^-1 r [n_dof][3], z may be r; warp: since the last update */
+void pal_hex_multigrid_solve(pal_hex_multigrid *mg, const pal_warp *warp, const double *r, double *z);
+#endif

@@ -1,0 +1,83 @@
+/* Preconditioners of implicit systems, A = (system->mass) M + (system->stiff) K without contact, chosen at load:
+ *   jacobi:     the inverses of the diagonal's blocks at the last update; nothing to make,
+ *   factor:     a Cholesky factor, warped (warp.h); best for small bodies. A newer one is made on a spare thread,
+ *   multigrid:  hex_multigrid.h; bodies of voxel hexahedra, any number of nodes,
+ *   incomplete: an incomplete factor of the present state, in a tenth of the memory of a factor.
+ * `auto` takes the factor for small bodies, while it has fewer than 1.5 million entries; for strong contrasts of
+ * stiffness up to 5,000 nodes; and wherever multigrid cannot be had; else multigrid. Jacobi is never chosen: it is for
+ * comparison, and for bodies whose elements change faster than levels can be made.
+ *
+ * Deterministic: a refreshed factor takes effect after a simulated time that follows from its operation count, never
+ * from the clock. Thread: [load] to make, then [sim]. */
+#ifndef PAL_SIM_IMPLICIT_PRECONDITIONER_H
+#define PAL_SIM_IMPLICIT_PRECONDITIONER_H
+#include "server/num/cholesky.h"
+#include "server/num/incomplete_cholesky.h"
+#include "server/sim/implicit/hex_multigrid.h"
+
+typedef enum pal_precondition {
+    PAL_PRECONDITION_AUTO,
+    PAL_PRECONDITION_JACOBI,
+    PAL_PRECONDITION_FACTOR,
+    PAL_PRECONDITION_MULTIGRID,
+    PAL_PRECONDITION_INCOMPLETE
+} pal_precondition;
+const char *pal_precondition_name(pal_precondition kind); /* never NULL [any] */
+
+typedef struct pal_preconditioner {
+    pal_precondition kind;
+    char reason[120]; /* why `auto` chose it, with numbers; "" where it was asked for */
+    pal_system *system;
+    const pal_node_rotations *rotations;
+    pal_warp warp;
+    /* factor and incomplete: pattern of K, values are work space; diagonal blocks alone for jacobi */
+    pal_block_matrix blocks;
+    pal_cholesky *factor;
+    pal_incomplete_cholesky incomplete;
+    pal_grid_hierarchy *grid; /* levels, also for further preconditioners of the same body; NULL: none */
+    pal_hex_multigrid multigrid;
+    double *inverse; /* jacobi [n_dof][9] */
+    double *work;    /* [n_dof][3] */
+    double *next;    /* quat at the factor in progress [n_dof][4] */
+    bool single;     /* the factor is in single precision */
+    bool refreshed;  /* the factor is newer than the one of the last update */
+    bool pending;    /* a factor is in progress */
+    double left_s;   /* simulated time until it takes effect, or until another refresh may start; below 0: now */
+    int n_update;    /* factors or levels made since load */
+    double analyse_s, update_s;
+} pal_preconditioner;
+
+typedef struct pal_preconditioner_options {
+    pal_precondition kind;
+    bool single;
+    /* the same body's preconditioner whose pattern or levels and kind are taken; NULL: none */
+    const pal_preconditioner *like;
+} pal_preconditioner_options;
+
+/* the body is at rest. REFUSED: the kind does not suit the body; MEMORY. [load] */
+pal_err pal_preconditioner_make(const pal_preconditioner_options *options, pal_system *system,
+                                const pal_node_rotations *rotations, pal_arena *arena, pal_diagnostic *diag,
+                                pal_preconditioner *out);
+void pal_preconditioner_destroy(pal_preconditioner *p);
+
+/* takes the system's coefficients and last linearise, at the present rotations; a refresh in progress is dropped.
+ * NUMERIC, MEMORY: a factor in use stays */
+pal_err pal_preconditioner_update(pal_preconditioner *p);
+/* declares what is in use to be of the body at rest, not at the present rotations */
+void pal_preconditioner_set_rest(pal_preconditioner *p);
+void pal_preconditioner_rotate(pal_preconditioner *p);                            /* to the present rotations */
+void pal_preconditioner_solve(pal_preconditioner *p, const double *r, double *z); /* z ~ A^-1 r; z may be r */
+
+/* true: a refresh may start; false: one is in progress or was recently */
+static inline bool pal_preconditioner_ready(const pal_preconditioner *p)
+{
+    return !p->pending && !(p->left_s > 0);
+}
+/* starts a factor on a spare thread, of the system as it is or, at_rest, as of rest; false: not ready, or not a factor
+ */
+bool pal_preconditioner_refresh(pal_preconditioner *p, bool at_rest);
+/* once per sub-step: adopts a factor that is due, and waits for it if necessary */
+void pal_preconditioner_step(pal_preconditioner *p, double dt_s);
+/* sets sizes and times of a report */
+void pal_preconditioner_report(const pal_preconditioner *p, pal_solve_report *out);
+#endif
