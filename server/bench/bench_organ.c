@@ -87,13 +87,13 @@ static pal_err pull(pal_world *world, const job *j, double share)
 
 static double largest_move_m(const pal_body *body)
 {
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < body->n_node; i++) {
         double d2 = 0;
         for (int c = 0; c < 3; c++) d2 += pow(body->x[3 * i + c] - body->x_rest[3 * i + c], 2);
-        most = fmax(most, d2);
+        max = fmax(max, d2);
     }
-    return sqrt(most);
+    return sqrt(max);
 }
 
 static pal_err run_live(const job *j, pal_table *r, pal_diagnostic *diag)

@@ -43,10 +43,13 @@ static pal_err make_scene(const pal_scene *scene, const char *element, const cha
     return pal_entry_put_number(&def->solver, "newton", NEWTON_A_STEP, diag);
 }
 
-/* a factor for many nodes takes hundreds of megabytes, and as long as conjugate gradients without one */
+/* a factor for many nodes takes hundreds of megabytes, and as long as conjugate gradients without one; cubes have
+ * multigrid */
 static pal_err spare_memory(pal_scene *scene)
 {
     pal_config_entry *solver = &scene->body[0].solver;
+    const pal_config_value *element = pal_entry_find(&scene->body[0].model, "element");
+    if (!element || !strncmp(element->text, "hex", 3)) return PAL_ERR_OK;
     PAL_TRY(pal_entry_put_text(solver, "linear", "incomplete", NULL));
     return pal_entry_put_number(solver, "iterations", MAX_GRADIENTS, NULL);
 }

@@ -31,8 +31,8 @@ pal_err pal_rest_solution_make(const pal_scene *scene, const pal_body *body, con
 pal_err pal_rest_solution_coarser(const pal_scene *scene, const pal_body *body, const char *element, const char *law,
                                   pal_diagnostic *diag, pal_rest_solution *out);
 /* The same with `size` voxels on the longest axis, made as a configuration switch makes it (configuration.h); model
- * fem only. Above 4,000 nodes it uses conjugate gradients with an incomplete factor, which needs a tenth of the
- * memory and less time. REFUSED also if the body already has that mesh. */
+ * fem only. Above 4,000 nodes tetrahedra use conjugate gradients with an incomplete factor, which needs a tenth of the
+ * memory of a factor and less time. REFUSED also if the body already has that mesh. */
 pal_err pal_rest_solution_sized(const pal_scene *scene, const pal_body *body, const pal_configuration *configuration,
                                 int size, const char *law, pal_rest_solution *out);
 void pal_rest_solution_free(pal_rest_solution *rest); /* accepts a zeroed struct */

@@ -4,16 +4,16 @@
  * The ordering is found for points, whose three unknowns stay together: a ninth of the entries to order. Matrices are
  * scaled by a power of two near 1 / (largest diagonal), right sides likewise, so that single precision neither
  * overflows nor underflows whatever the units are. A pivot that lost fourteen digits of its diagonal entry counts as
- * not positive. While solving, numbers below the smallest normal one count as zero: where inertia rules, answers decay
- * from point to point until they would be subnormal, which costs a hundred times a normal number.
+ * not positive. While solving, subnormal numbers count as zero (subnormals.h).
  *
  * BLAS runs on the calling thread only: OpenBLAS and OpenMP are told so where they are loaded, since their idle threads
  * spin on the processors that simulation threads need. */
 #include "server/num/cholesky.h"
 
 #include "server/base/heap.h"
-#include "server/base/thread.h"
+#include "server/base/spare_thread.h"
 #include "server/num/panels.h"
+#include "server/num/subnormals.h"
 
 #include <cholmod.h>
 #include <dlfcn.h>
@@ -21,9 +21,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#ifdef __SSE2__
-#include <xmmintrin.h>
-#endif
 
 /* what one thread needs to factor */
 typedef struct work_area {
@@ -51,12 +48,9 @@ struct pal_cholesky {
     void *y, *vector; /* working vectors of a solve */
     work_area own, spare;
     factor now, next;
-    bool threaded, refreshing; /* there is a spare thread; it was given values that are not adopted yet */
-    pthread_t thread;
-    pthread_mutex_t lock;
-    pthread_cond_t changed;
-    bool quit, busy; /* under the lock. While busy, outcome, spare and next belong to the spare thread */
+    bool refreshing; /* the spare thread was given values that are not adopted yet: outcome, spare and next are its */
     pal_err outcome;
+    pal_spare_thread spare_thread;
 };
 
 /* calls a function of a library, where that is loaded */
@@ -236,8 +230,7 @@ pal_err pal_cholesky_create(const pal_block_matrix *a, const uint8_t *fixed, pal
     pal_cholesky *c = calloc(1, sizeof *c);
     if (!c) return PAL_ERR_MEMORY;
     c->n = a->n;
-    pthread_mutex_init(&c->lock, NULL);
-    pthread_cond_init(&c->changed, NULL);
+    pal_spare_thread_init(&c->spare_thread);
     begin_work_area(&c->own);
     pal_err err = make(c, a, fixed);
     if (err)
@@ -250,15 +243,7 @@ pal_err pal_cholesky_create(const pal_block_matrix *a, const uint8_t *fixed, pal
 void pal_cholesky_destroy(pal_cholesky *c)
 {
     if (!c) return;
-    if (c->threaded) {
-        pthread_mutex_lock(&c->lock);
-        c->quit = true;
-        pthread_cond_broadcast(&c->changed);
-        pthread_mutex_unlock(&c->lock);
-        pthread_join(c->thread, NULL);
-    }
-    pthread_cond_destroy(&c->changed);
-    pthread_mutex_destroy(&c->lock);
+    pal_spare_thread_destroy(&c->spare_thread);
     end_work_area(&c->own);
     end_work_area(&c->spare);
     pal_panels_free(&c->panels);
@@ -377,47 +362,27 @@ pal_err pal_cholesky_solve(pal_cholesky *c, const double *b, double *x)
         return PAL_ERR_OK;
     }
     double s = pal_block_matrix_scale(max), t = c->now.scale / s;
-#ifdef __SSE2__
-    unsigned mode = _mm_getcsr();
-    _mm_setcsr(mode | 0x8040); /* flush to zero, denormals are zero */
-#endif
+    const unsigned mode = pal_subnormals_flush();
     if (c->now.single)
         pal_panels_solve_single(&c->panels, c->now.value, c->n, c->place, s, b, t, x, c->y, c->vector);
     else
         pal_panels_solve_double(&c->panels, c->now.value, c->n, c->place, s, b, t, x, c->y, c->vector);
-#ifdef __SSE2__
-    _mm_setcsr(mode);
-#endif
+    pal_subnormals_restore(mode);
     return PAL_ERR_OK;
 }
 
-static void *spare_thread(void *self)
+static void factor_spare(void *self)
 {
     pal_cholesky *c = self;
-    pthread_mutex_lock(&c->lock);
-    for (;;) {
-        while (!c->quit && !c->busy) pthread_cond_wait(&c->changed, &c->lock);
-        if (c->quit) break;
-        pthread_mutex_unlock(&c->lock);
-        pal_err err = factor_values(c, &c->spare, c->next.single, &c->next);
-        pthread_mutex_lock(&c->lock);
-        c->outcome = err;
-        c->busy = false;
-        pthread_cond_broadcast(&c->changed);
-    }
-    pthread_mutex_unlock(&c->lock);
-    return NULL;
+    c->outcome = factor_values(c, &c->spare, c->next.single, &c->next);
 }
 
-/* the spare work area and its thread, made by the first refresh */
+/* the spare work area, made by the first refresh */
 static pal_err start_spare(pal_cholesky *c)
 {
     if (!c->spare.started) begin_work_area(&c->spare);
     if (!c->spare.pattern) c->spare.pattern = cholmod_copy_factor(c->own.pattern, &c->spare.common);
-    if (!c->spare.pattern) return error_of(&c->spare.common);
-    if (c->threaded) return PAL_ERR_OK;
-    c->threaded = pal_thread_start(&c->thread, spare_thread, c) == 0;
-    return c->threaded ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    return c->spare.pattern ? PAL_ERR_OK : error_of(&c->spare.common);
 }
 
 pal_err pal_cholesky_refresh(pal_cholesky *c, const pal_block_matrix *a)
@@ -430,10 +395,7 @@ pal_err pal_cholesky_refresh(pal_cholesky *c, const pal_block_matrix *a)
             free(c->next.value);
             c->next = (factor){.single = c->now.single};
         }
-        pthread_mutex_lock(&c->lock);
-        c->busy = true;
-        pthread_cond_broadcast(&c->changed);
-        pthread_mutex_unlock(&c->lock);
+        PAL_TRY(pal_spare_thread_run(&c->spare_thread, factor_spare, c));
     }
     c->refreshing = true;
     return PAL_ERR_OK;
@@ -443,10 +405,8 @@ pal_err pal_cholesky_adopt(pal_cholesky *c)
 {
     if (!c->refreshing) return PAL_ERR_STATE;
     c->refreshing = false;
-    pthread_mutex_lock(&c->lock);
-    while (c->busy) pthread_cond_wait(&c->changed, &c->lock);
+    pal_spare_thread_wait(&c->spare_thread);
     pal_err err = c->outcome;
-    pthread_mutex_unlock(&c->lock);
     if (err || c->n_free == 0) return err;
     factor old = c->now;
     c->now = c->next;

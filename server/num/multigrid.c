@@ -9,9 +9,10 @@
 
 const float pal_chebyshev_weight[PAL_CHEBYSHEV_DEGREE] = {1.00842544782028f, 1.08867839208730f, 1.33753125909618f};
 
-/* products of the power iteration that finds a largest eigenvalue (tests/num/test_multigrid.c: within a tenth) */
+/* products of the power iteration that finds a largest eigenvalue (tests/sim/implicit/test_preconditioner.c) */
 enum { POWER_ITERATIONS = 15 };
-/* relative shift of the coarsest diagonal: interpolation may lose rank at supports (tests/num/test_multigrid.c) */
+/* relative shift of the coarsest diagonal: interpolation may lose rank at supports
+ * (tests/sim/implicit/test_preconditioner.c) */
 #define COARSEST_SHIFT 1e-5
 
 typedef float vec4 __attribute__((vector_size(16)));

@@ -100,16 +100,30 @@ void pal_hex_single_multiply(const pal_elastic_hexes_single *single, const float
     }
 }
 
-void pal_hex_single_element(const pal_elastic_hexes *cubes, int e, double k, double to[24][24])
+/* to = R k R', one block of 3x3 */
+static void turn_block(const double r[9], const double k[9], double to[9])
 {
-    const int lane = cubes->simd_blocks.place[e];
-    const double mu = k * coefficients(cubes, 0)[lane], lambda = k * coefficients(cubes, 1)[lane];
+    double part[9];
+    for (int i = 0; i < 9; i++)
+        part[i] = r[i - i % 3] * k[i % 3] + r[i - i % 3 + 1] * k[3 + i % 3] + r[i - i % 3 + 2] * k[6 + i % 3];
+    for (int i = 0; i < 9; i++)
+        to[i] = part[i - i % 3] * r[3 * (i % 3)] + part[i - i % 3 + 1] * r[3 * (i % 3) + 1] +
+                part[i - i % 3 + 2] * r[3 * (i % 3) + 2];
+}
+
+void pal_hex_single_element(const pal_elastic_hexes_single *single, const float *rotation, int e, double to[24][24])
+{
+    const int place = single->cubes->simd_blocks.place[e], block = place / PAL_LANES, lane = place % PAL_LANES;
+    const float *stiff = single->stiff + 2 * PAL_LANES * block + lane;
+    double r[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, trace;
+    for (int i = 0; i < 9 && rotation; i++) r[i] = (double)rotation[(9 * block + i) * PAL_LANES + lane];
+    trace = r[0] + r[4] + r[8];
     for (int c = 0; c < 8; c++)
-        for (int d = c; d < 8; d++)
-            for (int i = 0; i < 3; i++)
-                for (int j = 0; j < 3; j++) {
-                    const double *part = cubes->reference[pal_hex_pair(c, d)][0];
-                    to[3 * c + i][3 * d + j] = mu * part[3 * i + j] + lambda * part[9 + 3 * i + j];
-                    to[3 * d + j][3 * c + i] = to[3 * c + i][3 * d + j];
-                }
+        for (int d = c; d < 8; d++) {
+            const double *part = single->cubes->reference[pal_hex_pair(c, d)][0];
+            double k[9];
+            for (int i = 0; i < 9; i++) k[i] = (double)stiff[0] * part[i] + (double)stiff[PAL_LANES] * part[9 + i];
+            if (trace < 3) turn_block(r, k, k);
+            for (int i = 0; i < 9; i++) to[3 * c + i / 3][3 * d + i % 3] = to[3 * d + i % 3][3 * c + i / 3] = k[i];
+        }
 }

@@ -21,6 +21,7 @@ void pal_hex_single_stiffen(pal_elastic_hexes_single *single, double k);
 void pal_hex_single_rotate(pal_elastic_hexes_single *single);
 /* out += k K p; empty slots of p are 0 */
 void pal_hex_single_multiply(const pal_elastic_hexes_single *single, const float *p, float *out);
-/* K of element e at rest, k K [24][24] in corners and axes */
-void pal_hex_single_element(const pal_elastic_hexes *cubes, int e, double k, double to[24][24]);
+/* k K [24][24] of element e in corners and axes, turned by the rotation that `rotation` has for it, laid out as in
+ * `single`; NULL: at rest */
+void pal_hex_single_element(const pal_elastic_hexes_single *single, const float *rotation, int e, double to[24][24]);
 #endif

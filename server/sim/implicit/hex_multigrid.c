@@ -3,6 +3,7 @@
 
 #include "server/base/heap.h"
 #include "server/mesh/volume/cell_hierarchy.h"
+#include "server/num/subnormals.h"
 #include "server/sim/implicit/tuning.h"
 
 #include <math.h>
@@ -64,18 +65,27 @@ pal_err pal_hex_multigrid_make(const pal_body *body, const pal_elastic_hexes *cu
     *out = (pal_hex_multigrid){.body = body, .cubes = cubes, .grid = grid, .n_slot = body->node_order->n_slot};
     const size_t n = (size_t)out->n_slot;
     PAL_TRY(pal_hex_single_make(cubes, body->node_order, arena, &out->single));
+    if (out->single.rotation) {
+        out->turned = PAL_NEW(arena, float, 9 * PAL_LANES * (size_t)cubes->n_block);
+        if (!out->turned) return PAL_ERR_MEMORY;
+    }
     PAL_TRY(find_groups(out, arena));
     out->weight = PAL_NEW(arena, float, n), out->inverse = PAL_NEW(arena, float, n);
     out->x = PAL_NEW(arena, float, 3 * n), out->b = PAL_NEW(arena, float, 3 * n), out->d = PAL_NEW(arena, float, 3 * n);
     out->r = PAL_NEW(arena, float, 3 * n), out->q = PAL_NEW(arena, float, 3 * n);
     if (!out->weight || !out->inverse || !out->x || !out->b || !out->d || !out->r || !out->q) return PAL_ERR_MEMORY;
-    return pal_multigrid_create(grid, &out->coarse);
+    PAL_TRY(pal_multigrid_create(grid, &out->coarse));
+    pal_spare_thread_init(&out->spare_thread);
+    return PAL_ERR_OK;
 }
 
 void pal_hex_multigrid_destroy(pal_hex_multigrid *mg)
 {
+    if (!mg->coarse) return;
+    pal_spare_thread_destroy(&mg->spare_thread);
     pal_multigrid_destroy(mg->coarse);
-    mg->coarse = NULL;
+    pal_multigrid_destroy(mg->next);
+    mg->coarse = mg->next = NULL;
 }
 
 /* ---- finest level ---- */
@@ -168,73 +178,63 @@ void pal_hex_multigrid_solve(pal_hex_multigrid *mg, const pal_warp *warp, const 
 {
     const int32_t *slot = mg->body->node_order->slot;
     const size_t n = (size_t)mg->n_slot;
-    double most = 0;
-    for (int i = 0; i < 3 * mg->body->n_node; i++) most = fmax(most, fabs(r[i]));
-    if (!(most > 0) || !isfinite(most)) {
+    double largest = 0;
+    for (int i = 0; i < 3 * mg->body->n_node; i++) largest = fmax(largest, fabs(r[i]));
+    if (!(largest > 0) || !isfinite(largest)) {
         memset(z, 0, pal_body_bytes3(mg->body));
         return;
     }
+    const unsigned mode = pal_subnormals_flush();
     for (int i = 0; i < mg->body->n_node; i++)
-        for (size_t c = 0; c < 3; c++) mg->b[(size_t)slot[i] + c * n] = (float)(r[3 * i + (int)c] / most);
+        for (size_t c = 0; c < 3; c++) mg->b[(size_t)slot[i] + c * n] = (float)(r[3 * i + (int)c] / largest);
     smooth(mg, true);
     correct(mg, warp);
     smooth(mg, false);
     for (int i = 0; i < mg->body->n_node; i++)
-        for (size_t c = 0; c < 3; c++) z[3 * i + (int)c] = most * (double)mg->x[(size_t)slot[i] + c * n];
+        for (size_t c = 0; c < 3; c++) z[3 * i + (int)c] = largest * (double)mg->x[(size_t)slot[i] + c * n];
+    pal_subnormals_restore(mode);
 }
 
 /* ---- values ---- */
 
-/* the rotation of an element at the last linearise; false: none */
-static bool rotation_of(const pal_elastic_hexes *cubes, int e, double r[9])
-{
-    const int lane = cubes->simd_blocks.place[e];
-    const double *at = cubes->rotation + 9 * (lane / PAL_LANES) * PAL_LANES + lane % PAL_LANES;
-    double trace = 0;
-    for (int i = 0; i < 9; i++) r[i] = at[i * PAL_LANES];
-    for (int i = 0; i < 9; i += 4) trace += r[i];
-    return cubes->law != PAL_LAW_LINEAR && trace < 3;
-}
-
-/* k = R k R' */
-static void turn_element(const double r[9], double k[24][24])
-{
-    for (int c = 0; c < 24; c += 3)
-        for (int d = 0; d < 24; d += 3) {
-            double part[3][3];
-            for (int i = 0; i < 3; i++)
-                for (int j = 0; j < 3; j++)
-                    part[i][j] =
-                        r[3 * i] * k[c][d + j] + r[3 * i + 1] * k[c + 1][d + j] + r[3 * i + 2] * k[c + 2][d + j];
-            for (int i = 0; i < 3; i++)
-                for (int j = 0; j < 3; j++)
-                    k[c + i][d + j] = part[i][0] * r[3 * j] + part[i][1] * r[3 * j + 1] + part[i][2] * r[3 * j + 2];
-        }
-}
-
-/* the first level's matrix, and D of the finest */
-static void add_elements(pal_hex_multigrid *mg)
+/* values of the coarser levels, of the rotations given */
+static pal_err fill_levels(const pal_hex_multigrid *mg, const float *rotation, pal_multigrid *to)
 {
     const pal_grid_level *grid = &mg->grid->level[0];
-    const pal_elastic_hexes *cubes = mg->cubes;
-    const int32_t *slot = mg->body->node_order->slot;
+    const pal_body *body = mg->body;
+    pal_multigrid_zero(to);
     for (int g = 0; g < grid->n_cell; g++) {
-        double sum[24][24] = {{0}};
+        double sum[24][24] = {{0}}, k[24][24];
         for (int32_t m = grid->first[g]; m < grid->first[g + 1]; m++) {
             const int e = grid->child[m];
-            const int32_t *node = cubes->hexes->node + 8 * e;
-            double k[24][24], r[9];
             unsigned fixed = 0;
-            pal_hex_single_element(cubes, e, mg->stiff, k);
-            for (int c = 0; c < 8; c++) {
-                fixed |= mg->body->support[node[c]] ? 1u << c : 0;
-                mg->inverse[slot[node[c]]] +=
-                    (float)((k[3 * c][3 * c] + k[3 * c + 1][3 * c + 1] + k[3 * c + 2][3 * c + 2]) / 3);
-            }
-            if (rotation_of(cubes, e, r)) turn_element(r, k);
+            for (int c = 0; c < 8; c++) fixed |= body->support[body->hexes->node[8 * e + c]] ? 1u << c : 0;
+            pal_hex_single_element(&mg->single, rotation, e, k);
             pal_multigrid_coarsen_cell(k, grid->octant[e], fixed, sum);
         }
-        pal_multigrid_add_cell(mg->coarse, g, sum);
+        pal_multigrid_add_cell(to, g, sum);
+    }
+    for (int i = 0; i < body->n_node; i++) pal_multigrid_add_mass(to, i, (double)mg->weight[body->node_order->slot[i]]);
+    return pal_multigrid_finish(to);
+}
+
+/* masses and D of the finest level */
+static void fill_diagonal(pal_hex_multigrid *mg, double mass)
+{
+    const pal_body *body = mg->body;
+    const pal_hexes *hexes = body->hexes;
+    const int32_t *slot = body->node_order->slot;
+    double k[24][24];
+    memset(mg->inverse, 0, sizeof *mg->inverse * (size_t)mg->n_slot);
+    for (int e = 0; e < hexes->n_hex; e++) {
+        pal_hex_single_element(&mg->single, NULL, e, k);
+        for (int c = 0; c < 24; c += 3)
+            mg->inverse[slot[hexes->node[8 * e + c / 3]]] += (float)((k[c][c] + k[c + 1][c + 1] + k[c + 2][c + 2]) / 3);
+    }
+    for (int i = 0; i < body->n_node; i++) {
+        float *inverse = &mg->inverse[slot[i]], weight = (float)(mass * body->mass_kg[i]);
+        mg->weight[slot[i]] = weight;
+        *inverse = !body->support[i] && *inverse + weight > 0 ? 1 / (*inverse + weight) : 0;
     }
 }
 
@@ -281,20 +281,39 @@ void pal_hex_multigrid_rotate(pal_hex_multigrid *mg)
 
 pal_err pal_hex_multigrid_update(pal_hex_multigrid *mg, double mass, double stiff)
 {
-    const pal_body *body = mg->body;
-    const int32_t *slot = body->node_order->slot;
-    mg->mass = mass, mg->stiff = stiff;
+    pal_spare_thread_wait(&mg->spare_thread);
     pal_hex_single_stiffen(&mg->single, stiff);
     pal_hex_single_rotate(&mg->single);
-    pal_multigrid_zero(mg->coarse);
-    memset(mg->inverse, 0, sizeof *mg->inverse * (size_t)mg->n_slot);
-    add_elements(mg);
-    for (int i = 0; i < body->n_node; i++) {
-        float *inverse = &mg->inverse[slot[i]];
-        mg->weight[slot[i]] = (float)(mass * body->mass_kg[i]);
-        if (mass > 0) pal_multigrid_add_mass(mg->coarse, i, mass * body->mass_kg[i]);
-        *inverse = !body->support[i] && *inverse + mg->weight[slot[i]] > 0 ? 1 / (*inverse + mg->weight[slot[i]]) : 0;
-    }
+    fill_diagonal(mg, mass);
     find_lambda(mg);
-    return pal_multigrid_finish(mg->coarse);
+    return fill_levels(mg, mg->single.rotation, mg->coarse);
+}
+
+static void make_next(void *self)
+{
+    pal_hex_multigrid *mg = self;
+    mg->outcome = mg->next ? PAL_ERR_OK : pal_multigrid_create(mg->grid, &mg->next);
+    if (!mg->outcome) mg->outcome = fill_levels(mg, mg->turned, mg->next);
+}
+
+pal_err pal_hex_multigrid_refresh(pal_hex_multigrid *mg)
+{
+    const pal_elastic_hexes *cubes = mg->cubes;
+    for (int i = 0; i < 9 * PAL_LANES * cubes->n_block && mg->turned; i++) mg->turned[i] = (float)cubes->rotation[i];
+    return pal_spare_thread_run(&mg->spare_thread, make_next, mg);
+}
+
+pal_err pal_hex_multigrid_adopt(pal_hex_multigrid *mg)
+{
+    pal_spare_thread_wait(&mg->spare_thread);
+    if (mg->outcome) return mg->outcome;
+    pal_multigrid *before = mg->coarse;
+    mg->coarse = mg->next, mg->next = before;
+    return PAL_ERR_OK;
+}
+
+double pal_hex_multigrid_flops(const pal_hex_multigrid *mg)
+{
+    /* an element's 36 blocks turned and interpolated; the coarser levels add a third */
+    return 1e4 * mg->cubes->n_hex;
 }

@@ -6,6 +6,7 @@
  * arena, and the heap for the coarser levels. Thread: [load] to make, then [sim]. */
 #ifndef PAL_SIM_IMPLICIT_HEX_MULTIGRID_H
 #define PAL_SIM_IMPLICIT_HEX_MULTIGRID_H
+#include "server/base/spare_thread.h"
 #include "server/num/multigrid.h"
 #include "server/sim/elements/elastic_hex_single.h"
 #include "server/sim/implicit/warp.h"
@@ -15,7 +16,10 @@ typedef struct pal_hex_multigrid {
     const pal_elastic_hexes *cubes;
     pal_elastic_hexes_single single;
     const pal_grid_hierarchy *grid;
-    pal_multigrid *coarse;
+    pal_multigrid *coarse, *next; /* in use; in the making on the spare thread, NULL before the first refresh */
+    pal_spare_thread spare_thread;
+    pal_err outcome;          /* of the spare thread */
+    float *turned;            /* rotations at the refresh, as in `single`; NULL: the law is linear */
     float lambda;             /* no eigenvalue of D^-1 A is larger */
     double mass, stiff;       /* of the last update */
     int n_group, n_slot;      /* groups of 8 slots with nodes */
@@ -31,6 +35,11 @@ pal_err pal_hex_multigrid_make(const pal_body *body, const pal_elastic_hexes *cu
 void pal_hex_multigrid_destroy(pal_hex_multigrid *mg);
 /* takes material and rotations of the last linearise. NUMERIC: not positive definite; MEMORY */
 pal_err pal_hex_multigrid_update(pal_hex_multigrid *mg, double mass, double stiff);
+/* starts coarser levels of the rotations of the last linearise on a spare thread. MEMORY */
+pal_err pal_hex_multigrid_refresh(pal_hex_multigrid *mg);
+/* waits for them and puts them into use. NUMERIC, MEMORY: the ones before stay */
+pal_err pal_hex_multigrid_adopt(pal_hex_multigrid *mg);
+double pal_hex_multigrid_flops(const pal_hex_multigrid *mg); /* operations of a refresh, equal on all machines */
 void pal_hex_multigrid_rotate(pal_hex_multigrid *mg); /* takes the rotations of the last linearise, finest level */
 /* z ~ A^-1 r [n_dof][3], z may be r; warp: since the last update */
 void pal_hex_multigrid_solve(pal_hex_multigrid *mg, const pal_warp *warp, const double *r, double *z);

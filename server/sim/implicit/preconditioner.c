@@ -196,13 +196,22 @@ void pal_preconditioner_rotate(pal_preconditioner *p)
 
 bool pal_preconditioner_refresh(pal_preconditioner *p, bool at_rest)
 {
-    if (p->kind != PAL_PRECONDITION_FACTOR || !pal_preconditioner_ready(p)) return false;
-    pal_system_assemble(p->system, &p->blocks);
-    if (pal_cholesky_refresh(p->factor, &p->blocks)) return false;
+    if (!pal_preconditioner_ready(p)) return false;
+    double flops;
+    if (p->kind == PAL_PRECONDITION_MULTIGRID) {
+        if (pal_hex_multigrid_refresh(&p->multigrid)) return false;
+        flops = pal_hex_multigrid_flops(&p->multigrid);
+    } else if (p->kind == PAL_PRECONDITION_FACTOR) {
+        pal_system_assemble(p->system, &p->blocks);
+        if (pal_cholesky_refresh(p->factor, &p->blocks)) return false;
+        flops = pal_cholesky_flops(p->factor);
+    } else {
+        return false;
+    }
     memcpy(p->next, p->rotations->quat, 4 * sizeof(double) * (size_t)p->warp.n_dof);
     if (at_rest) pal_warp_rest(p->next, p->warp.n_dof);
     p->pending = true;
-    p->left_s = pal_cholesky_flops(p->factor) / PAL_REFRESH_FLOPS;
+    p->left_s = flops / PAL_REFRESH_FLOPS;
     return true;
 }
 
@@ -211,7 +220,8 @@ void pal_preconditioner_step(pal_preconditioner *p, double dt_s)
     p->left_s -= dt_s;
     if (!p->pending || p->left_s > 0) return;
     p->pending = false, p->left_s = PAL_PAUSE_S;
-    if (pal_cholesky_adopt(p->factor)) return;
+    if (p->kind == PAL_PRECONDITION_MULTIGRID ? pal_hex_multigrid_adopt(&p->multigrid) : pal_cholesky_adopt(p->factor))
+        return;
     memcpy(p->warp.base, p->next, 4 * sizeof(double) * (size_t)p->warp.n_dof);
     p->n_update++;
     p->refreshed = true;

@@ -1,7 +1,8 @@
 /* Preconditioners of implicit systems, A = (system->mass) M + (system->stiff) K without contact, chosen at load:
  *   jacobi:     the inverses of the diagonal's blocks at the last update; nothing to make,
- *   factor:     a Cholesky factor, warped (warp.h); best for small bodies. A newer one is made on a spare thread,
- *   multigrid:  hex_multigrid.h; bodies of voxel hexahedra, any number of nodes,
+ *   factor:     a Cholesky factor, warped (warp.h); best for small bodies.
+ *   multigrid:  hex_multigrid.h; bodies of voxel hexahedra, any number of nodes; of both a newer one is made on a spare
+ *               thread when solves need too many iterations,
  *   incomplete: an incomplete factor of the present state, in a tenth of the memory of a factor.
  * `auto` takes the factor for small bodies, while it has fewer than 1.5 million entries; for strong contrasts of
  * stiffness up to 5,000 nodes; and wherever multigrid cannot be had; else multigrid. Jacobi is never chosen: it is for
@@ -73,8 +74,8 @@ static inline bool pal_preconditioner_ready(const pal_preconditioner *p)
 {
     return !p->pending && !(p->left_s > 0);
 }
-/* starts a factor on a spare thread, of the system as it is or, at_rest, as of rest; false: not ready, or not a factor
- */
+/* starts a factor or levels on a spare thread, of the system as it is or, at_rest, as of rest; false: not ready, or of
+ * another kind */
 bool pal_preconditioner_refresh(pal_preconditioner *p, bool at_rest);
 /* once per sub-step: adopts a factor that is due, and waits for it if necessary */
 void pal_preconditioner_step(pal_preconditioner *p, double dt_s);

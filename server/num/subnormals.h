@@ -1,0 +1,28 @@
+/* Numbers below the smallest normal one count as zero between these two calls: where inertia rules, answers decay from
+ * point to point until they would be subnormal, which costs a hundred times a normal number. Thread: any, its own. */
+#ifndef PAL_NUM_SUBNORMALS_H
+#define PAL_NUM_SUBNORMALS_H
+#ifdef __SSE2__
+#include <xmmintrin.h>
+#endif
+
+/* returns what pal_subnormals_restore takes */
+static inline unsigned pal_subnormals_flush(void)
+{
+#ifdef __SSE2__
+    const unsigned mode = _mm_getcsr();
+    _mm_setcsr(mode | 0x8040);
+    return mode;
+#else
+    return 0;
+#endif
+}
+static inline void pal_subnormals_restore(unsigned mode)
+{
+#ifdef __SSE2__
+    _mm_setcsr(mode);
+#else
+    (void)mode;
+#endif
+}
+#endif

@@ -1,0 +1,312 @@
+/* Preconditioners of implicit solvers: iterations of multigrid at growing size, bending, contrast, near
+ * incompressibility and with bad cells; that it changes no answer; that one application is symmetric and positive; what
+ * is chosen, and what is refused. Bounds on iterations are those measured, plus a quarter (tests/bench/README.md). */
+#include "server/base/vec3.h"
+#include "server/sim/elements/elastic_hex.h"
+#include "server/sim/implicit/preconditioner.h"
+#include "tests/fixtures/fem_beam.h"
+#include "tests/fixtures/random.h"
+
+static pal_diagnostic diag;
+
+static pal_solve_report report_of(const fem_beam *b)
+{
+    pal_solve_report report;
+    CHECK(pal_world_solve_report(b->world, 0, &report));
+    return report;
+}
+
+/* iterations of a static solve of the reference beam with n voxels across, linear, to 1e-6 */
+static int solve_static(fem_beam *b, const char *linear)
+{
+    beam_solver(b, "static_newton");
+    pal_entry_put_text(&b->def->solver, "linear", linear, NULL);
+    beam_key(b, "tolerance", 1e-6);
+    CHECK(!beam_open(b, &diag));
+    beam_load_end(b, 100);
+    CHECK(!pal_world_step(b->world, 1.0 / 60));
+    CHECK(report_of(b).converged);
+    return report_of(b).n_cg;
+}
+
+static void iterations_do_not_grow_with_the_body(void)
+{
+    static const int across[] = {6, 8, 12, 16};
+    int n[4];
+    for (int k = 0; k < CHECK_REPEATS(4, 2); k++) {
+        fem_beam b;
+        beam_reference(&b, across[k]);
+        beam_element(&b, "hex8_bbar", "linear");
+        n[k] = solve_static(&b, "multigrid");
+        printf("  %d nodes: %d iterations to 1e-6\n", b.body->n_node, n[k]);
+        CHECK_LE(n[k], 14);
+        beam_free(&b);
+    }
+    CHECK_LE(n[CHECK_REPEATS(4, 2) - 1], n[0] + 3);
+}
+
+static void every_preconditioner_gives_the_same_answer(void)
+{
+    static const char *const ways[] = {"direct", "multigrid", "incomplete"};
+    double end[3][3];
+    for (int k = 0; k < 3; k++) {
+        fem_beam b;
+        beam_reference(&b, 8);
+        beam_element(&b, "hex8_bbar", "corotational");
+        (void)solve_static(&b, ways[k]);
+        beam_end(&b, end[k]);
+        beam_free(&b);
+        /* the tolerance is of the residual; on this beam the displacement is off by some ten times as much */
+        for (int c = 0; c < 3; c++) CHECK_NEAR(end[k][c], end[0][c], 1e-5 * fabs(end[0][2]));
+    }
+}
+
+/* what its own supports leave of a body that flies off is the same as with a factor */
+static void a_free_body_is_relieved_as_with_a_factor(void)
+{
+    static const char *const ways[] = {"auto", "multigrid"};
+    double stretch[2];
+    for (int k = 0; k < 2; k++) {
+        fem_beam b;
+        double end[3], start = 0;
+        beam_make(&b, 24, 6, 6, 0.05 / 6, false);
+        beam_element(&b, "hex8_bbar", "linear");
+        beam_solver(&b, "static_newton");
+        pal_entry_put_text(&b.def->solver, "free", "inertia_relief", NULL);
+        pal_entry_put_text(&b.def->solver, "linear", ways[k], NULL);
+        REQUIRE(!beam_open(&b, &diag));
+        beam_load_end(&b, 100);
+        REQUIRE(!pal_world_step(b.world, 1.0 / 60));
+        CHECK(report_of(&b).converged);
+        CHECK_LE(report_of(&b).n_cg, 30);
+        printf("  %s: %d iterations to 1e-8\n", ways[k], report_of(&b).n_cg);
+        beam_end(&b, end);
+        for (int i = 0; i < b.body->n_node; i++)
+            if (b.body->x_rest[3 * i] < 1e-9) start += (b.body->x[3 * i + 2] - b.body->x_rest[3 * i + 2]) / 49;
+        stretch[k] = end[2] - start;
+        beam_free(&b);
+    }
+    CHECK_NEAR(stretch[1] / stretch[0], 1, 1e-6);
+}
+
+typedef struct hard_case {
+    const char *name;
+    double poisson, young_high_Pa;
+    bool thin;
+    int max;
+} hard_case;
+
+/* thin: every second voxel of the border has 2 % of its material */
+static void hard_cases_converge(void)
+{
+    static const hard_case list[] = {{"nu 0.3", 0.3, 0, false, 8},           {"nu 0.45", 0.45, 0, false, 13},
+                                     {"nu 0.49", 0.49, 0, false, 30},        {"contrast 100", 0.45, 1e7, false, 22},
+                                     {"contrast 1e4", 0.45, 1e9, false, 40}, {"thin border", 0.45, 0, true, 25}};
+    for (int k = 0; k < 6; k++) {
+        fem_beam b;
+        beam_reference(&b, 8);
+        beam_element(&b, "hex8_bbar", "linear");
+        b.def->material.poisson = list[k].poisson;
+        if (list[k].young_high_Pa > 0) { /* a rod of 2 x 2 voxels in the middle of the beam's length */
+            pal_region *rod = &b.def->region[b.def->n_region++];
+            *rod = (pal_region){.kind = PAL_REGION_BOX,
+                                .young_Pa = list[k].young_high_Pa,
+                                .poisson = NAN,
+                                .density_kg_m3 = NAN,
+                                .low_m = {0.05, 0.01875, 0.01875},
+                                .high_m = {0.15, 0.03125, 0.03125}};
+        }
+        for (int e = 0; e < b.mesh.hexes.n_hex && list[k].thin; e++) {
+            const double *x = b.mesh.tets.x + 3 * b.mesh.hexes.node[8 * e];
+            const int j = (int)lround(x[1] / b.mesh.tets.edge_m), m = (int)lround(x[2] / b.mesh.tets.edge_m);
+            if ((j == 0 || j == 7 || m == 0 || m == 7) && e % 2) b.mesh.hexes.fill[e] = 0.02f;
+        }
+        const int n = solve_static(&b, "multigrid");
+        printf("  %s: %d iterations to 1e-6\n", list[k].name, n);
+        CHECK_LE(n, list[k].max);
+        beam_free(&b);
+    }
+}
+
+/* live, bent by nearly half its length and let go: iterations of the factor and of multigrid */
+static void a_bent_beam_needs_few_iterations(void)
+{
+    static const char *const kinds[] = {"factor", "multigrid", "jacobi"};
+    double mean[3] = {0}, end[3][3];
+    for (int k = 0; k < 3; k++) {
+        fem_beam b;
+        beam_reference(&b, 8);
+        beam_element(&b, "hex8_bbar", "corotational");
+        pal_entry_put_text(&b.def->solver, "preconditioner", kinds[k], NULL);
+        beam_key(&b, "tolerance", 1e-4);
+        beam_key(&b, "iterations", 1000);
+        REQUIRE(!beam_open(&b, &diag));
+        beam_load_end(&b, 800);
+        for (int i = 0; i < 30; i++) {
+            REQUIRE(!pal_world_step(b.world, 1.0 / 60));
+            mean[k] += report_of(&b).n_cg / 30.0;
+        }
+        beam_end(&b, end[k]);
+        printf("  %s: end at %.4f m, %.1f iterations a step to 1e-4\n", kinds[k], end[k][2], mean[k]);
+        /* the same motion but for the tolerance of its solves */
+        for (int c = 0; c < 3; c++) CHECK_NEAR(end[k][c], end[0][c], 1e-2 * fabs(end[0][2]));
+        beam_free(&b);
+    }
+    CHECK_LE(mean[1], 10);
+    CHECK_LE(20 * mean[1], mean[2]);
+}
+
+/* a beam that turns about its root by 90 degrees and more: levels of the present rotations, made beside the steps */
+static void fresh_levels_save_iterations(void)
+{
+    double mean[3] = {0}, end[3];
+    for (int k = 0; k < 3; k++) { /* without, with, and with again, which gives the same bits */
+        fem_beam b;
+        beam_reference(&b, 6);
+        beam_element(&b, "hex8_bbar", "corotational");
+        b.def->material.young_Pa = 1e6;
+        pal_entry_put_text(&b.def->solver, "preconditioner", "multigrid", NULL);
+        pal_entry_put_bool(&b.def->solver, "refresh", k > 0, NULL);
+        beam_key(&b, "refresh_iterations", 5);
+        beam_key(&b, "tolerance", 1e-4);
+        REQUIRE(!beam_open(&b, &diag));
+        beam_load_end(&b, 1e5);
+        for (int i = 0; i < 90; i++) {
+            REQUIRE(!pal_world_step(b.world, 1.0 / 60));
+            if (i >= 60) mean[k] += report_of(&b).n_cg / 30.0;
+        }
+        double at[3];
+        beam_end(&b, at);
+        end[k] = at[2];
+        printf("  %s: end at %.4f m, %.1f iterations a step\n", k ? "refreshed" : "levels of rest", at[2], mean[k]);
+        CHECK((report_of(&b).n_factor > 1) == (k > 0));
+        beam_free(&b);
+    }
+    CHECK_LE(mean[1], 0.8 * mean[0]);
+    CHECK_NEAR(end[1], end[2], 0);
+    CHECK_NEAR(mean[1], mean[2], 0);
+}
+
+static void an_application_is_symmetric_and_positive(void)
+{
+    fem_beam b;
+    beam_reference(&b, 8);
+    beam_element(&b, "hex8_bbar", "corotational");
+    REQUIRE(!beam_open(&b, &diag));
+    /* the solver of the world has its own; this one is made beside it, of the same component */
+    pal_arena *arena = pal_arena_create(1 << 20, true);
+    const pal_component *elastic = NULL;
+    for (int i = 0; i < pal_world_component_count(b.world); i++)
+        if (!strcmp(pal_world_component(b.world, i)->effect->name, "hex_elastic"))
+            elastic = pal_world_component(b.world, i);
+    REQUIRE(arena && elastic);
+    const pal_build build = {
+        .scene = b.scene, .def = b.def, .body = b.body, .arena = arena, .diag = &diag, .made = elastic, .n_made = 1};
+    pal_system system;
+    pal_node_rotations rotations;
+    pal_preconditioner p;
+    REQUIRE(!pal_system_make(&build, &system));
+    REQUIRE(!pal_node_rotations_make(&system, arena, &rotations));
+    const pal_preconditioner_options options = {.kind = PAL_PRECONDITION_MULTIGRID};
+    REQUIRE(!pal_preconditioner_make(&options, &system, &rotations, arena, &diag, &p));
+    const size_t n = 3 * (size_t)b.body->n_node;
+    double *r = calloc(4 * n, sizeof *r), *s = r + n, *z = s + n, *q = z + n;
+    REQUIRE(r != NULL);
+    for (int turn = 0; turn < 2; turn++) { /* at rest, and twisted since the levels were made */
+        system.mass = 1, system.stiff = 1.0 / 3600;
+        pal_system_linearise(&system);
+        pal_node_rotations_update(&rotations, &system);
+        if (turn == 0) REQUIRE(!pal_preconditioner_update(&p));
+        pal_preconditioner_rotate(&p);
+        uint64_t seed = 5;
+        double rz, sq, rq, sz, rr = 0;
+        for (int trial = 0; trial < 3; trial++) {
+            for (size_t i = 0; i < n; i++) r[i] = random_signed(&seed), s[i] = random_signed(&seed);
+            pal_system_clear_supported(b.body, r), pal_system_clear_supported(b.body, s);
+            pal_preconditioner_solve(&p, r, z), pal_preconditioner_solve(&p, s, q);
+            rz = sq = rq = sz = 0;
+            for (size_t i = 0; i < n; i++) rz += r[i] * z[i], sq += s[i] * q[i], rq += r[i] * q[i], sz += s[i] * z[i];
+            CHECK(rz > 0 && sq > 0);
+            /* single precision throughout */
+            CHECK_NEAR(rq, sz, 1e-5 * sqrt(rz * sq));
+            rr = fmax(rr, fabs(rq - sz) / sqrt(rz * sq));
+        }
+        printf("  asymmetry %.1e\n", rr);
+        for (int i = 0; i < b.body->n_node; i++) {
+            double *x = b.body->x + 3 * i, a = 3 * x[0], y = x[1] - 0.025, w = x[2] - 0.025;
+            x[1] = 0.025 + cos(a) * y - sin(a) * w, x[2] = 0.025 + sin(a) * y + cos(a) * w;
+        }
+    }
+    free(r);
+    pal_preconditioner_destroy(&p);
+    pal_arena_destroy(arena);
+    beam_free(&b);
+}
+
+/* with what a body is preconditioned, by its report: only factors have entries */
+static bool has_factor(int across, const char *element, const char *kind, double young_high_Pa)
+{
+    fem_beam b;
+    beam_reference(&b, across);
+    beam_element(&b, element, "corotational");
+    if (kind) pal_entry_put_text(&b.def->solver, "preconditioner", kind, NULL);
+    if (young_high_Pa > 0) {
+        pal_region *end = &b.def->region[b.def->n_region++];
+        *end = (pal_region){.kind = PAL_REGION_BOX,
+                            .young_Pa = young_high_Pa,
+                            .poisson = NAN,
+                            .density_kg_m3 = NAN,
+                            .low_m = {0.1, -1, -1},
+                            .high_m = {1, 1, 1}};
+    }
+    CHECK(!beam_open(&b, &diag));
+    const bool factor = report_of(&b).factor_nonzeros > 0;
+    beam_free(&b);
+    return factor;
+}
+
+static void the_choice_follows_size_elements_and_contrast(void)
+{
+    CHECK(has_factor(4, "hex8_bbar", NULL, 0));
+    CHECK(!has_factor(8, "hex8_bbar", NULL, 0));
+    CHECK(has_factor(8, "hex8_bbar", "factor", 0));
+    CHECK(has_factor(8, "tet4", NULL, 0));
+    CHECK(has_factor(8, "hex8_bbar", NULL, 2e7));
+    CHECK(!has_factor(8, "hex8_bbar", NULL, 5e6));
+}
+
+static void what_it_cannot_do_is_refused(void)
+{
+    static const struct {
+        int across;
+        const char *element, *law, *solver, *expect;
+    } list[] = {
+        {8, "tet4", "corotational", "implicit_euler", "a multigrid preconditioner is for voxel hexahedra"},
+        {8, "hex8_bbar", "neo_hookean", "sdirk2", "a multigrid preconditioner is for voxel hexahedra"},
+        {2, "hex8_bbar", "corotational", "static_newton", "needs more than the body's 81 nodes"},
+    };
+    for (int k = 0; k < 3; k++) {
+        fem_beam b;
+        beam_reference(&b, list[k].across);
+        beam_element(&b, list[k].element, list[k].law);
+        beam_solver(&b, list[k].solver);
+        pal_entry_put_text(&b.def->solver, k == 2 ? "linear" : "preconditioner", "multigrid", NULL);
+        CHECK_INT(pal_world_create(b.scene, &diag, &b.world), PAL_ERR_REFUSED);
+        if (!strstr(diag.text, list[k].expect)) CHECK_TEXT(diag.text, list[k].expect);
+        beam_free(&b);
+    }
+}
+
+int main(void)
+{
+    RUN(iterations_do_not_grow_with_the_body);
+    RUN(every_preconditioner_gives_the_same_answer);
+    RUN(a_free_body_is_relieved_as_with_a_factor);
+    RUN(hard_cases_converge);
+    RUN(a_bent_beam_needs_few_iterations);
+    RUN(fresh_levels_save_iterations);
+    RUN(an_application_is_symmetric_and_positive);
+    RUN(the_choice_follows_size_elements_and_contrast);
+    RUN(what_it_cannot_do_is_refused);
+    return check_report();
+}
