@@ -2,11 +2,10 @@
 #include "server/sim/implicit/warp.h"
 
 #include "server/base/vec3.h"
-#include "server/num/polar.h"
+#include "server/sim/core/simd_wide.h"
 
+#include <float.h>
 #include <string.h>
-
-enum { ROTATION_ITERATIONS = 4 };
 
 void pal_warp_rest(double *quat, int n_dof)
 {
@@ -33,8 +32,20 @@ void pal_node_rotations_update(pal_node_rotations *rotations, const pal_system *
 {
     if (!rotations->any) return;
     pal_system_rotate(system, rotations->sum);
-    for (int i = 0; i < rotations->n_dof; i++)
-        pal_polar_rotation(rotations->sum + 9 * i, rotations->quat + 4 * i, ROTATION_ITERATIONS);
+    for (int first = 0; first < rotations->n_dof; first += PAL_WIDE) {
+        pal_wide f[9], q[4], r[9], m[9];
+        pal_wide_mask live;
+        for (int l = 0; l < PAL_WIDE; l++) {
+            const int i = first + l < rotations->n_dof ? first + l : first;
+            double size = 0;
+            for (int k = 0; k < 9; k++) f[k][l] = rotations->sum[9 * i + k], size += fabs(f[k][l]);
+            for (int k = 0; k < 4; k++) q[k][l] = rotations->quat[4 * i + k];
+            live[l] = size > DBL_MIN && size < DBL_MAX ? -1 : 0; /* nodes that no element turns stay */
+        }
+        pal_wide_polar(f, live, q, r, m);
+        for (int l = 0; l < PAL_WIDE && first + l < rotations->n_dof; l++)
+            for (int k = 0; k < 4 && live[l]; k++) rotations->quat[4 * (first + l) + k] = q[k][l];
+    }
 }
 
 pal_err pal_warp_make(const pal_node_rotations *rotations, pal_arena *arena, pal_warp *out)
