@@ -2,6 +2,7 @@
  * pieces; a worker that wakes later does not enter it, so nobody waits for a thread that has no work. */
 #include "server/base/team.h"
 
+#include "server/base/subnormals.h"
 #include "server/base/thread.h"
 
 #include <errno.h>
@@ -11,6 +12,9 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <unistd.h>
+
+/* looks of a thread that waits without sleeping, between two chances for others on its core: some ten microseconds */
+enum { WATCHES = 512 };
 
 typedef struct worker {
     pal_team *team;
@@ -22,9 +26,11 @@ struct pal_team {
     pthread_mutex_t lock;
     pthread_cond_t begun, left; /* workers wait for begun, the caller for left            */
     bool open, quit;
-    int n_inside;          /* workers at work on this run, without the caller        */
-    uint64_t run;          /* number of the run: a worker enters a run once */
+    _Atomic bool held;     /* workers watch for the next run instead of sleeping */
+    _Atomic int n_inside;  /* workers at work on this run, without the caller        */
+    _Atomic uint64_t run;  /* number of the run: a worker enters a run once */
     _Atomic int64_t next;  /* next piece; each worker increments it once past n */
+    unsigned mode;         /* of the caller's numbers, which workers take over  */
     int n, size, n_thread; /* size = n_thread + 1                                    */
     void (*piece)(void *user, int worker, int index);
     void *user;
@@ -58,6 +64,25 @@ static void work(pal_team *team, int number)
     }
 }
 
+static inline void pause_core(void)
+{
+#ifdef __SSE2__
+    __builtin_ia32_pause();
+#endif
+}
+
+/* watches the team from outside the lock, which it leaves and takes again, while it is held and `run` is its last run
+ */
+static void watch(pal_team *team, uint64_t run)
+{
+    pthread_mutex_unlock(&team->lock);
+    for (int k = 1; atomic_load(&team->held) && atomic_load(&team->run) == run; k++) {
+        pause_core();
+        if (k % WATCHES == 0) sched_yield();
+    }
+    pthread_mutex_lock(&team->lock);
+}
+
 static void *live(void *self)
 {
     worker *w = self;
@@ -65,11 +90,20 @@ static void *live(void *self)
     uint64_t seen = 0;
     pthread_mutex_lock(&team->lock);
     for (;;) {
-        while (!team->quit && !(team->open && team->run != seen)) pthread_cond_wait(&team->begun, &team->lock);
+        while (!team->quit && !(team->open && team->run != seen)) {
+            if (!team->held) {
+                pthread_cond_wait(&team->begun, &team->lock);
+                continue;
+            }
+            seen = team->run; /* a run that ended before it was seen */
+            watch(team, seen);
+        }
         if (team->quit) break;
         seen = team->run;
         team->n_inside++;
+        const unsigned mode = team->mode;
         pthread_mutex_unlock(&team->lock);
+        pal_subnormals_restore(mode);
         work(team, w->number);
         pthread_mutex_lock(&team->lock);
         if (--team->n_inside == 0) pthread_cond_signal(&team->left);
@@ -104,6 +138,7 @@ pal_err pal_team_create(int n_worker, pal_team **out)
 void pal_team_destroy(pal_team *team)
 {
     if (!team) return;
+    pal_team_release(team);
     pthread_mutex_lock(&team->lock);
     team->quit = true;
     pthread_cond_broadcast(&team->begun);
@@ -122,7 +157,7 @@ int pal_team_size(const pal_team *team)
 
 void pal_team_run(pal_team *team, int n, void (*piece)(void *user, int worker, int index), void *user)
 {
-    if (n <= 1 || team->n_thread == 0) {
+    if (n <= 1 || !team || team->n_thread == 0) {
         for (int i = 0; i < n; i++) piece(user, 0, i);
         return;
     }
@@ -130,6 +165,7 @@ void pal_team_run(pal_team *team, int n, void (*piece)(void *user, int worker, i
     team->piece = piece;
     team->user = user;
     team->n = n;
+    team->mode = pal_subnormals_mode();
     atomic_store_explicit(&team->next, 0, memory_order_relaxed);
     team->run++;
     team->open = true;
@@ -141,6 +177,31 @@ void pal_team_run(pal_team *team, int n, void (*piece)(void *user, int worker, i
     work(team, 0);
     pthread_mutex_lock(&team->lock);
     team->open = false;
-    while (team->n_inside > 0) pthread_cond_wait(&team->left, &team->lock);
+    while (team->n_inside > 0) {
+        if (!team->held) {
+            pthread_cond_wait(&team->left, &team->lock);
+            continue;
+        }
+        pthread_mutex_unlock(&team->lock);
+        for (int k = 1; atomic_load(&team->n_inside) > 0; k++) {
+            pause_core();
+            if (k % WATCHES == 0) sched_yield();
+        }
+        pthread_mutex_lock(&team->lock);
+    }
     pthread_mutex_unlock(&team->lock);
+}
+
+void pal_team_hold(pal_team *team)
+{
+    if (!team || team->n_thread == 0) return;
+    pthread_mutex_lock(&team->lock);
+    team->held = true;
+    pthread_cond_broadcast(&team->begun);
+    pthread_mutex_unlock(&team->lock);
+}
+
+void pal_team_release(pal_team *team)
+{
+    if (team) atomic_store(&team->held, false);
 }

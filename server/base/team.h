@@ -1,5 +1,6 @@
 /* A team of threads that works through independent pieces of work in parallel. What piece i computes must depend on i
- * alone, never on the worker or on the order: then the result is the same for any number of cores. Thread: one caller
+ * alone, never on the worker or on the order: then the result is the same for any number of cores. Workers treat
+ * subnormal numbers as the caller does (subnormals.h). Thread: one caller
  * at a time. */
 #ifndef PAL_BASE_TEAM_H
 #define PAL_BASE_TEAM_H
@@ -17,6 +18,11 @@ void pal_team_destroy(pal_team *team);   /* joins; NULL is fine */
 int pal_team_size(const pal_team *team); /* workers, the caller among them */
 /* Calls piece(user, worker, i) once for every i in [0, n), 0 <= worker < size, and returns when all are done; the
  * caller is worker 0. A worker runs one piece at a time, so its own data need no lock. What the pieces wrote is visible
- * on return. A piece must not run the same team. n <= 0: nothing */
+ * on return. A piece must not run the same team. n <= 0: nothing; team NULL: the caller does all */
 void pal_team_run(pal_team *team, int n, void (*piece)(void *user, int worker, int index), void *user);
+/* While a team is held, workers without work watch for the next run instead of sleeping, so that pieces of ten
+ * microseconds pay. They yield to other threads of the same core, but take what is left of it: hold a team for a step
+ * at most. NULL: nothing */
+void pal_team_hold(pal_team *team);
+void pal_team_release(pal_team *team);
 #endif

@@ -20,6 +20,7 @@ typedef struct job {
     pal_prepared mesh;
     const char *solver, *kind;
     double young_Pa, step_s;
+    int threads;
 } job;
 
 /* the resolution that gives nearest to so many nodes */
@@ -52,6 +53,7 @@ static pal_err make_scene(const job *j, pal_scene *scene, pal_diagnostic *diag)
     pal_scene_default(scene);
     scene->n_body = 1;
     scene->step_s = j->step_s;
+    scene->threads = j->threads;
     pal_body_def *body = &scene->body[0];
     pal_body_default(body, "body", &j->mesh);
     body->material.young_Pa = j->young_Pa, body->material.poisson = 0.45;
@@ -121,7 +123,8 @@ static pal_err run_live(const job *j, pal_table *r, pal_diagnostic *diag)
     if (!err) {
         const double p50_ms = pal_median(ms, n);
         TABLE_ROW(r, NUMBER("nodes", "nodes", 6, 0, body->n_node), TEXT("solver", "solver", -14, j->solver),
-                  TEXT("preconditioner", "preconditioner", -14, j->kind), NUMBER("young_Pa", "E Pa", 7, 0, j->young_Pa),
+                  TEXT("preconditioner", "preconditioner", -14, j->kind),
+                  NUMBER("threads", "threads", 7, 0, j->threads), NUMBER("young_Pa", "E Pa", 7, 0, j->young_Pa),
                   NUMBER("make_s", "make s", 7, 3, made - began), NUMBER("p50_ms", "ms p50", 8, 3, p50_ms),
                   NUMBER("p95_ms", "ms p95", 8, 3, ms[n * 95 / 100]), NUMBER("cg_mean", "CG mean", 7, 1, mean_cg),
                   NUMBER("cg_max", "CG max", 6, 0, max_cg), NUMBER("move_mm", "moves mm", 8, 2, 1e3 * move_m));
@@ -159,9 +162,9 @@ static pal_err run_static(const job *j, pal_table *r, pal_diagnostic *diag)
 pal_err bench_organ(pal_table *r, pal_diagnostic *diag)
 {
     static const int size[] = {1300, 2700, 6900, 15770, 60000};
-    static const char *const kind[] = {"auto", "factor", "multigrid", "jacobi"}, *const linear[] = {"multigrid",
-                                                                                                    "incomplete",
-                                                                                                    "direct"};
+    static const char *const kind[] = {"factor", "jacobi", "multigrid", "multigrid"}, *const linear[] = {"multigrid",
+                                                                                                         "incomplete",
+                                                                                                         "direct"};
     const pal_mesh_file_options options = {.weld = 0};
     pal_surface surface = {0};
     pal_err err = r->argument ? pal_mesh_file_read(r->argument, &options, &surface, NULL, NULL, NULL, diag)
@@ -171,8 +174,8 @@ pal_err bench_organ(pal_table *r, pal_diagnostic *diag)
         job j = {.solver = "implicit_euler", .step_s = 1.0 / 60};
         err = make_body(&surface, size[s], &j.mesh, diag);
         for (int k = 0; k < 8 && !err; k++) {
-            j.kind = kind[k % 4], j.young_Pa = k < 4 ? 5e3 : 1e5;
-            if (k % 4 != 1 || j.mesh.tets.n_node < 10000) err = run_live(&j, r, diag);
+            j.kind = kind[k % 4], j.young_Pa = k < 4 ? 5e3 : 1e5, j.threads = k % 4 == 3 ? 2 : 1;
+            if (k % 4 != 0 || j.mesh.tets.n_node < 10000) err = run_live(&j, r, diag);
         }
         pal_prepared_free(&j.mesh);
     }

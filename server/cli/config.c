@@ -34,6 +34,7 @@ const pal_flag pal_config_keys[PAL_CONFIG_KEYS] = {
     {"error_m", "M", PAL_FLAG_NUMBER, NULL, 0, 0.01,
      "most error of streamed positions, m (1/3000 of the box, at most 0.00005)"},
     {"max_clients", "N", PAL_FLAG_COUNT, NULL, 1, 10000, "clients at once (200)"},
+    {"threads", "N", PAL_FLAG_COUNT, NULL, 1, 64, "threads that share a step, where the scene does not say (1)"},
     {"lcm", "URL", PAL_FLAG_TEXT, NULL, 0, 0, "also speak LCM there, in a process of its own (off)"},
     {"lcm_key", "FILE", PAL_FLAG_TEXT, NULL, 0, 0,
      "key file of that bus: only what is signed with a key in it moves tools (none)"},
@@ -43,17 +44,17 @@ const pal_flag pal_config_keys[PAL_CONFIG_KEYS] = {
 };
 /* where a key is stored, in the order of the keys */
 static const size_t place[PAL_CONFIG_KEYS] = {
-    offsetof(pal_config, listen), offsetof(pal_config, port),     offsetof(pal_config, allow_remote),
-    offsetof(pal_config, hosts),  offsetof(pal_config, tls_cert), offsetof(pal_config, tls_key),
-    offsetof(pal_config, health), offsetof(pal_config, open),     offsetof(pal_config, keys),
-    offsetof(pal_config, viewer), offsetof(pal_config, error_m),  offsetof(pal_config, max_clients),
-    offsetof(pal_config, lcm),    offsetof(pal_config, lcm_key),  offsetof(pal_config, lcm_channel),
-    offsetof(pal_config, log),    offsetof(pal_config, record),
+    offsetof(pal_config, listen),      offsetof(pal_config, port),     offsetof(pal_config, allow_remote),
+    offsetof(pal_config, hosts),       offsetof(pal_config, tls_cert), offsetof(pal_config, tls_key),
+    offsetof(pal_config, health),      offsetof(pal_config, open),     offsetof(pal_config, keys),
+    offsetof(pal_config, viewer),      offsetof(pal_config, error_m),  offsetof(pal_config, max_clients),
+    offsetof(pal_config, threads),     offsetof(pal_config, lcm),      offsetof(pal_config, lcm_key),
+    offsetof(pal_config, lcm_channel), offsetof(pal_config, log),      offsetof(pal_config, record),
 };
 
 void pal_config_default(pal_config *config)
 {
-    *config = (pal_config){.listen = "127.0.0.1", .port = 8090, .max_clients = 200, .log = "info"};
+    *config = (pal_config){.listen = "127.0.0.1", .port = 8090, .max_clients = 200, .threads = 1, .log = "info"};
 }
 
 pal_log_level pal_config_log_level(const pal_config *config)

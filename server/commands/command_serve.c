@@ -136,6 +136,7 @@ static void note_failed(serve_run *run, const char *input, const pal_diagnostic 
 static pal_err open_inputs(serve_run *run, const char *const *input, int n_input, pal_diagnostic *diag)
 {
     run->options.record = run->config.record;
+    run->options.threads = run->config.threads;
     run->options.record_by_name = n_input > 1 || run->scenes;
     run->options.wake = pal_server_gate_wake, run->options.user = &run->gate;
     for (int i = 0; i < (n_input || run->scenes ? n_input : 1); i++) {

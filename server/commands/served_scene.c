@@ -55,6 +55,7 @@ static pal_err open_recording(const char *path, pal_served_scene *served, pal_se
 pal_err pal_served_scene_open(const pal_served_options *options, pal_served_scene *served, pal_diagnostic *diag)
 {
     pal_session_options session = {.wake = options->wake, .user = options->user, .only_observed = true};
+    if (served->scene->scene.threads == 0) served->scene->scene.threads = options->threads;
     PAL_TRY(open_study(served, diag));
     const pal_scene *scene = served->studied.scene;
     PAL_TRY(pal_preflight_run(scene, &served->preflight, diag));

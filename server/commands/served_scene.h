@@ -12,6 +12,7 @@
 
 typedef struct pal_served_options {
     pal_surface_scene surface; /* how bare surfaces are prepared */
+    int threads;               /* of a scene that gives none */
     const char *record;        /* path of recordings; "": none */
     bool record_by_name;       /* the path gets the session's name */
     bool resumes;

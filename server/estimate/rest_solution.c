@@ -34,6 +34,7 @@ static pal_err make_scene(const pal_scene *scene, const char *element, const cha
     out->scene = malloc(sizeof *out->scene);
     if (!out->scene) return PAL_ERR_MEMORY;
     *out->scene = *scene;
+    out->scene->threads = 1;
     pal_body_def *def = &out->scene->body[0];
     if (strcmp(def->model.name, "fem") && (element || law)) pal_entry_init(&def->model, "model", "fem");
     if (element) PAL_TRY(put_text(&def->model, "element", element, diag));

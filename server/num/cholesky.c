@@ -12,8 +12,8 @@
 
 #include "server/base/heap.h"
 #include "server/base/spare_thread.h"
+#include "server/base/subnormals.h"
 #include "server/num/panels.h"
-#include "server/num/subnormals.h"
 
 #include <cholmod.h>
 #include <dlfcn.h>

@@ -11,6 +11,8 @@ const float pal_chebyshev_weight[PAL_CHEBYSHEV_DEGREE] = {1.00842544782028f, 1.0
 
 /* products of the power iteration that finds a largest eigenvalue (tests/sim/implicit/test_preconditioner.c) */
 enum { POWER_ITERATIONS = 15 };
+/* rows of a piece of work of a thread: some five microseconds */
+enum { ROWS = 96 };
 /* relative shift of the coarsest diagonal: interpolation may lose rank at supports
  * (tests/sim/implicit/test_preconditioner.c) */
 #define COARSEST_SHIFT 1e-5
@@ -24,7 +26,7 @@ typedef struct matrix {
     vec4 (*value)[3];        /* blocks, column by column [start[n]] */
     float *inverse;          /* 1 / D, 0 at fixed nodes [n] */
     float lambda;            /* no eigenvalue of D^-1 A is larger */
-    vec4 *x, *b, *d, *r;     /* answer, right side, direction, residual [n] */
+    vec4 *x, *b, *r, *d, *e; /* answer, right side, residual, direction and the next one [n] */
 } matrix;
 
 struct pal_multigrid {
@@ -103,8 +105,8 @@ static pal_err make_level(const pal_grid_level *grid, pal_arena *arena, matrix *
     out->value = pal_arena_array(arena, (size_t)out->start[n], sizeof *out->value);
     out->inverse = PAL_NEW(arena, float, n);
     out->x = PAL_NEW(arena, vec4, n), out->b = PAL_NEW(arena, vec4, n);
-    out->d = PAL_NEW(arena, vec4, n), out->r = PAL_NEW(arena, vec4, n);
-    return out->value && out->inverse && out->x && out->b && out->d && out->r ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    out->r = PAL_NEW(arena, vec4, n), out->d = PAL_NEW(arena, vec4, n), out->e = PAL_NEW(arena, vec4, n);
+    return out->value && out->inverse && out->x && out->b && out->r && out->d && out->e ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 static pal_err make(pal_multigrid *mg)
@@ -261,40 +263,66 @@ static pal_err factor_coarsest(pal_multigrid *mg)
 
 /* ---- smoothing ---- */
 
-/* out = b - A x, or A x without b */
-static void multiply(const matrix *a, const vec4 *b, const vec4 *x, vec4 *out)
+/* row i of A x */
+static inline vec4 multiply_row(const matrix *a, int i, const vec4 *x)
 {
-    for (int i = 0; i < a->n; i++) {
-        vec4 sum = {0}, other = {0};
-        for (int32_t k = a->start[i]; k < a->start[i + 1]; k++) {
-            const vec4 *block = a->value[k], at = x[a->column[k]];
-            sum += block[0] * at[0] + block[1] * at[1];
-            other += block[2] * at[2];
-        }
-        out[i] = b ? b[i] - (sum + other) : sum + other;
+    vec4 sum = {0}, other = {0};
+    for (int32_t k = a->start[i]; k < a->start[i + 1]; k++) {
+        const vec4 *block = a->value[k], at = x[a->column[k]];
+        sum += block[0] * at[0] + block[1] * at[1];
+        other += block[2] * at[2];
+    }
+    return sum + other;
+}
+
+/* one step of the smoother, or what else is done row by row */
+typedef struct pass {
+    matrix *a;
+    enum { FROM_ZERO, FROM_X, STEP, RESIDUAL } what;
+    float keep, take, weight;
+} pass;
+
+static void pass_rows(void *user, int worker, int index)
+{
+    const pass *p = user;
+    matrix *a = p->a;
+    const int first = index * ROWS, end = first + ROWS < a->n ? first + ROWS : a->n;
+    (void)worker;
+    for (int i = first; i < end; i++) {
+        const vec4 b = p->what == STEP ? a->r[i] : a->b[i];
+        a->r[i] = p->what == FROM_ZERO ? b : b - multiply_row(a, i, p->what == STEP ? a->d : a->x);
+        if (p->what == RESIDUAL) continue;
+        a->e[i] = p->take * a->inverse[i] * a->r[i];
+        if (p->what == STEP) a->e[i] += p->keep * a->d[i];
     }
 }
 
-/* x = the smoother's answer, from 0 or from x */
-static void smooth(matrix *a, bool from_zero)
+static void run_pass(pass *p, pal_team *team)
 {
-    const float first = 4 / (3 * a->lambda);
-    if (from_zero)
-        memcpy(a->r, a->b, sizeof *a->r * (size_t)a->n);
-    else
-        multiply(a, a->b, a->x, a->r);
-    for (int i = 0; i < a->n; i++) {
-        a->d[i] = first * a->inverse[i] * a->r[i];
-        a->x[i] = pal_chebyshev_weight[0] * a->d[i] + (from_zero ? (vec4){0} : a->x[i]);
-    }
-    for (int k = 1; k < PAL_CHEBYSHEV_DEGREE; k++) {
-        const float keep = pal_chebyshev_keep(k), take = pal_chebyshev_take(k) / a->lambda;
-        multiply(a, a->r, a->d, a->r);
-        for (int i = 0; i < a->n; i++) {
-            a->d[i] = keep * a->d[i] + take * a->inverse[i] * a->r[i];
-            a->x[i] += pal_chebyshev_weight[k] * a->d[i];
-        }
-    }
+    matrix *a = p->a;
+    pal_team_run(team, (a->n + ROWS - 1) / ROWS, pass_rows, p);
+    if (p->what == RESIDUAL) return;
+    vec4 *before = a->d;
+    a->d = a->e, a->e = before;
+    /* a pass of its own, since rows read x of their neighbours */
+    for (int i = 0; i < a->n; i++) a->x[i] = p->weight * a->d[i] + (p->what == FROM_ZERO ? (vec4){0} : a->x[i]);
+}
+
+/* x = the smoother's answer, from 0 or from x */
+static void smooth(matrix *a, pal_team *team, bool from_zero)
+{
+    run_pass(&(pass){.a = a,
+                     .what = from_zero ? FROM_ZERO : FROM_X,
+                     .take = 4 / (3 * a->lambda),
+                     .weight = pal_chebyshev_weight[0]},
+             team);
+    for (int k = 1; k < PAL_CHEBYSHEV_DEGREE; k++)
+        run_pass(&(pass){.a = a,
+                         .what = STEP,
+                         .keep = pal_chebyshev_keep(k),
+                         .take = pal_chebyshev_take(k) / a->lambda,
+                         .weight = pal_chebyshev_weight[k]},
+                 team);
 }
 
 /* the norm sqrt(d' D d), in which D^-1 A is symmetric */
@@ -319,8 +347,8 @@ static void measure(matrix *a, const uint8_t *fixed)
     double lambda = 1, size = size_of_direction(a);
     for (int k = 0; k < POWER_ITERATIONS && size > 0 && isfinite(size); k++) {
         for (int i = 0; i < a->n; i++) a->d[i] *= (float)(1 / size);
-        multiply(a, NULL, a->d, a->r);
-        for (int i = 0; i < a->n; i++) a->d[i] = a->inverse[i] * a->r[i];
+        for (int i = 0; i < a->n; i++) a->r[i] = a->inverse[i] * multiply_row(a, i, a->d);
+        for (int i = 0; i < a->n; i++) a->d[i] = a->r[i];
         lambda = size = size_of_direction(a);
     }
     a->lambda = (float)(PAL_CHEBYSHEV_SAFE * lambda);
@@ -353,7 +381,7 @@ static void solve_coarsest(pal_multigrid *mg, matrix *a)
     for (int i = 0; i < a->n; i++) a->x[i] = (vec4){(float)v[3 * i], (float)v[3 * i + 1], (float)v[3 * i + 2], 0};
 }
 
-static void cycle(pal_multigrid *mg, int k)
+static void cycle(pal_multigrid *mg, pal_team *team, int k)
 {
     matrix *a = &mg->level[k];
     if (k == mg->n_level - 1) {
@@ -362,27 +390,27 @@ static void cycle(pal_multigrid *mg, int k)
     }
     const pal_grid_level *grid = &mg->grid->level[k + 1];
     matrix *coarse = &mg->level[k + 1];
-    smooth(a, true);
-    multiply(a, a->b, a->x, a->r);
+    smooth(a, team, true);
+    run_pass(&(pass){.a = a, .what = RESIDUAL}, team);
     memset(coarse->b, 0, sizeof *coarse->b * (size_t)coarse->n);
     for (int i = 0; i < a->n; i++) {
         if (grid->start[i] == grid->start[i + 1]) continue;
         const vec4 part = weight(grid, i) * a->r[i];
         for (int32_t m = grid->start[i]; m < grid->start[i + 1]; m++) coarse->b[grid->from[m]] += part;
     }
-    cycle(mg, k + 1);
+    cycle(mg, team, k + 1);
     for (int i = 0; i < a->n; i++) {
         if (grid->start[i] == grid->start[i + 1]) continue;
         vec4 sum = {0};
         for (int32_t m = grid->start[i]; m < grid->start[i + 1]; m++) sum += coarse->x[grid->from[m]];
         a->x[i] += weight(grid, i) * sum;
     }
-    smooth(a, false);
+    smooth(a, team, false);
 }
 
-void pal_multigrid_cycle(pal_multigrid *mg)
+void pal_multigrid_cycle(pal_multigrid *mg, pal_team *team)
 {
-    cycle(mg, 0);
+    cycle(mg, team, 0);
 }
 
 /* ---- cells ---- */

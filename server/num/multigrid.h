@@ -9,7 +9,7 @@
  * cycle. Thread: [load] to make, then one thread at a time. */
 #ifndef PAL_NUM_MULTIGRID_H
 #define PAL_NUM_MULTIGRID_H
-#include "server/base/err.h"
+#include "server/base/team.h"
 
 #include <stddef.h>
 #include <stdint.h>
@@ -63,7 +63,8 @@ pal_err pal_multigrid_finish(pal_multigrid *mg);
 /* vectors of the first level, x y z 0 of each node: a cycle reads the right side and writes the answer [n_node][4] */
 float *pal_multigrid_right_side(pal_multigrid *mg);
 const float *pal_multigrid_answer(const pal_multigrid *mg);
-void pal_multigrid_cycle(pal_multigrid *mg); /* answer ~ A^-1 right side */
+/* answer ~ A^-1 right side. team: NULL, or threads that share the work; the same bits with any number */
+void pal_multigrid_cycle(pal_multigrid *mg, pal_team *team);
 
 /* k [24][24], a matrix of a finer cell in corners and axes, interpolated from the corners of the cell that contains it
  * at `octant` and added to `to`; corners whose bits are set in `fixed` do not move */

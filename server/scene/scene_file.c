@@ -321,6 +321,7 @@ static pal_err read_scene(const pal_json *at, pal_loaded_scene *loaded)
     PAL_TRY(pal_json_number(at, "gravity_m_s2", -1e4, 1e4, &scene->gravity_m_s2));
     PAL_TRY(pal_json_bool(at, "keep_real_time", &scene->keep_real_time));
     PAL_TRY(pal_json_count(at, "max_substep", 1, 1000000, &scene->max_substep));
+    PAL_TRY(pal_json_count(at, "threads", 1, PAL_THREADS_MAX, &scene->threads));
     PAL_TRY(pal_json_vector(at, "up", scene->up));
     PAL_TRY(read_axes(at, scene->anatomical_axes));
     PAL_TRY(read_tools(at, scene));

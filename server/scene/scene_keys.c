@@ -5,7 +5,7 @@ static const struct {
 } objects[PAL_KEYS_OBJECTS] = {
     [PAL_KEYS_SCENE] = {"",
                         {"name", "title", "source", "accuracy", "budget", "step_s", "up", "anatomical_axes",
-                         "gravity_m_s2", "max_substep", "keep_real_time", "bodies", "tools"}},
+                         "gravity_m_s2", "max_substep", "threads", "keep_real_time", "bodies", "tools"}},
     [PAL_KEYS_ACCURACY] = {"accuracy.", {"max_error_mm", "text"}},
     [PAL_KEYS_BUDGET] = {"budget.", {"step_ms"}},
     [PAL_KEYS_TOOL] = {"tools[].", {"name", "radius_m", "force_cap_N", "instrument", "trocar_m"}},

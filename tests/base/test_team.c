@@ -134,6 +134,29 @@ static void hands_over_thousands_of_short_runs(void)
     pal_team_destroy(team);
 }
 
+/* held for some runs of each ten, so that workers pass from watching to sleep and back */
+static void hands_over_as_well_while_held(void)
+{
+    pal_team *team = NULL;
+    REQUIRE(pal_team_create(3, &team) == PAL_ERR_OK);
+    int count[6] = {0}, wanted[6] = {0};
+    for (int run = 0; run < 3000; run++) {
+        if (run % 10 == 2) pal_team_hold(team);
+        int n = run % 7;
+        pal_team_run(team, n, add_one, count);
+        for (int i = 0; i < n; i++) wanted[i]++;
+        for (int i = 0; i < 6; i++) count[i] += 3, wanted[i] += 3;
+        if (run % 10 == 8) pal_team_release(team);
+    }
+    pal_team_hold(team); /* and destroyed while held */
+    for (int i = 0; i < 6; i++) CHECK_INT(count[i], wanted[i]);
+    pal_team_destroy(team);
+    pal_team_run(NULL, 6, add_one, count); /* without a team the caller does all */
+    for (int i = 0; i < 6; i++) CHECK_INT(count[i], wanted[i] + 1);
+    pal_team_hold(NULL);
+    pal_team_release(NULL);
+}
+
 typedef struct meeting {
     sem_t come[3];
     atomic_int met;
@@ -170,7 +193,9 @@ static void sleeps_between_runs(void)
     int count[6] = {0};
     REQUIRE(pal_team_create(6, &team) == PAL_ERR_OK);
     for (int run = 1; run <= 20; run++) {
+        if (run % 2) pal_team_hold(team);
         pal_team_run(team, 6, add_one, count);
+        pal_team_release(team);
         wait_asleep(5);
     }
     for (int i = 0; i < 6; i++) CHECK_INT(count[i], 20);
@@ -258,6 +283,7 @@ int main(void)
     sem_init(&asleep_changed, 0, 0);
     RUN(does_every_piece_once_and_one_at_a_time_per_worker);
     RUN(hands_over_thousands_of_short_runs);
+    RUN(hands_over_as_well_while_held);
     RUN(works_side_by_side);
     RUN(sleeps_between_runs);
     RUN(is_as_large_as_the_cores_that_it_may_use);

@@ -17,6 +17,7 @@
 
 struct pal_body;
 struct pal_step;
+struct pal_team;
 
 /* The static answer of the body to a load at its present shape, from an implicit solver with a static factor
  * (implicit/compliance.h), or for an explicit one beside it (implicit/tissue_compliance.h) */
@@ -140,6 +141,7 @@ typedef struct pal_body {
     struct pal_active_nodes *active_nodes; /* packed working arrays (active_nodes.h); NULL: none made       */
 
     /* ---- solver ---- */
+    struct pal_team *team; /* threads that share the work of a step; NULL: the caller's alone              */
     bool implicit;         /* the solver takes stiffness implicitly: contact need not suit explicit steps            */
     bool wants_compliance; /* set by CONTACT components in make; the SOLVE component is made after all others       */
     const pal_compliance *compliance; /* NULL: none                                                                   */

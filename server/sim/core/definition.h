@@ -123,6 +123,8 @@ typedef struct pal_tool_def {
     double trocar_m[3]; /* the point that the shaft passes; for clients, the simulation takes any pose */
 } pal_tool_def;
 
+enum { PAL_THREADS_MAX = 64 };
+
 /* s: limits of step_s */
 #define PAL_STEP_MIN_S 1e-4
 #define PAL_STEP_MAX_S 0.1
@@ -142,6 +144,7 @@ typedef struct pal_scene {
     char anatomical_axes[PAL_AXES_BYTES]; /* where x, y and z point in the patient, "RAS"; "": not known */
     double gravity_m_s2;                  /* 9.81; acts on bodies with the effect `gravity`            */
     bool keep_real_time; /* a server gives up accuracy before time (server/net/hub_watch.h); no effect elsewhere */
+    int threads;         /* that share a step, the same results with any number; 0: one, or the server's choice */
     int max_substep;     /* budget of sub-steps per step, refused beyond: 2000        */
     int n_body;
     pal_body_def body[PAL_BODY_MAX];

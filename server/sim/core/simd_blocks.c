@@ -3,6 +3,7 @@
 
 #include "server/base/vec3.h"
 
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -198,4 +199,50 @@ void pal_node_order_add(pal_node_order *node_order, double *force)
         force[3 * i] += fx[s], force[3 * i + 1] += fy[s], force[3 * i + 2] += fz[s];
     }
     memset(node_order->f, 0, 3 * sizeof(double) * (size_t)node_order->n_slot);
+}
+
+/* layer of each block, -1: it has several; returns the number of layers */
+static int find_layers(const pal_simd_blocks *blocks, const double *x_rest, int n_node, double edge_m,
+                       const int32_t *item, int n_item, int32_t *layer)
+{
+    lattice l;
+    const int n_block = blocks->n_lane / PAL_LANES;
+    const bool regular = find_lattice(x_rest, n_node, edge_m, &l);
+    const int axis = l.axis[2];
+    for (int b = 0; b < n_block; b++) layer[b] = regular ? -2 : -1;
+    for (int i = 0; i < n_item && regular; i++) {
+        int lowest = INT_MAX, *of = &layer[blocks->place[i] / PAL_LANES];
+        for (int c = 0; c < blocks->n_corner; c++) {
+            const double at = x_rest[3 * (size_t)item[blocks->n_corner * i + c] + (size_t)axis];
+            const int here = (int)floor((at - l.low[axis]) / edge_m + 0.5);
+            lowest = here < lowest ? here : lowest;
+        }
+        *of = *of == -2 || *of == lowest ? lowest : -1;
+    }
+    return regular ? l.n[axis] : 0;
+}
+
+pal_err pal_block_rounds_make(const pal_simd_blocks *blocks, const double *x_rest, int n_node, double edge_m,
+                              const int32_t *item, int n_item, pal_arena *arena, pal_block_rounds *out)
+{
+    const int n_block = blocks->n_lane / PAL_LANES;
+    int32_t *layer = malloc(sizeof *layer * ((size_t)n_block + 1));
+    if (!layer) return PAL_ERR_MEMORY;
+    const int n_layer = find_layers(blocks, x_rest, n_node, edge_m, item, n_item, layer);
+    *out = (pal_block_rounds){.n_round = 3};
+    out->part = PAL_NEW(arena, int32_t, out->n_round + 1);
+    out->first = PAL_NEW(arena, int32_t, n_layer + 2);
+    out->order = PAL_NEW(arena, int32_t, n_block);
+    int n_part = 0, n = 0;
+    for (int round = 0; round < 3 && out->part && out->first && out->order; round++) {
+        /* even layers, odd layers, blocks of several */
+        for (int k = round < 2 ? round : -1; k < (round < 2 ? n_layer : 0); k += 2) {
+            for (int b = 0; b < n_block; b++)
+                if (layer[b] == k) out->order[n++] = b;
+            if (n > out->first[n_part]) out->first[++n_part] = n;
+        }
+        out->part[round + 1] = n_part;
+    }
+    free(layer);
+    return out->part && out->first && out->order ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }

@@ -33,6 +33,17 @@ typedef struct pal_simd_blocks {
     int n_lane;     /* 8 * (n_strip + n_loose)                                                         */
 } pal_simd_blocks;
 
+/* Blocks in parts for several threads. Blocks of different parts of a round share no node, so that the parts of a round
+ * run side by side, and rounds one after the other: sums at nodes are in one order whatever the number of threads. On a
+ * lattice a part is a layer of cells across its shortest axis, and a round every second layer; blocks of several layers
+ * are a round of their own, as is everything on a mesh that is no lattice. */
+typedef struct pal_block_rounds {
+    int n_round;
+    int32_t *part;  /* first part of each round        [n_round + 1]     */
+    int32_t *first; /* first block in `order` of each part [n_part + 1]  */
+    int32_t *order; /* blocks                          [n_block]         */
+} pal_block_rounds;
+
 pal_err pal_node_order_make(const double *x_rest, int n_node, double edge_m, pal_arena *arena, pal_node_order **out);
 /* item [n_item][n_corner] nodes, sorts the corners of each item by their slots; MEMORY */
 pal_err pal_simd_blocks_make(const pal_node_order *node_order, int32_t *item, int n_item, int n_corner,
@@ -40,6 +51,9 @@ pal_err pal_simd_blocks_make(const pal_node_order *node_order, int32_t *item, in
 /* the same for up to PAL_SIMD_CORNERS_MAX corners, which keep their order */
 pal_err pal_simd_blocks_make_ordered(const pal_node_order *node_order, const int32_t *item, int n_item, int n_corner,
                                      pal_arena *arena, pal_simd_blocks *out);
+/* item [n_item][n_corner] as in pal_simd_blocks_make_ordered, x_rest [n_node][3]; MEMORY */
+pal_err pal_block_rounds_make(const pal_simd_blocks *blocks, const double *x_rest, int n_node, double edge_m,
+                              const int32_t *item, int n_item, pal_arena *arena, pal_block_rounds *out);
 /* node_order->x = positions x [n_node][3] */
 void pal_node_order_load(pal_node_order *node_order, const double *x);
 /* force [n_node][3] += node_order->f, which is zero afterwards */

@@ -1,6 +1,8 @@
 /* Voxel hexahedra in single precision. */
 #include "server/sim/elements/elastic_hex_single.h"
 
+#include "server/sim/core/simd.h"
+
 #include <string.h>
 
 typedef float pal_single8 __attribute__((vector_size(32)));
@@ -9,11 +11,13 @@ typedef float pal_single8_memory __attribute__((vector_size(32), aligned(4), may
 #define HEX_REAL   float
 #include "server/sim/elements/elastic_hex_modes.h"
 
-pal_err pal_hex_single_make(const pal_elastic_hexes *cubes, const pal_node_order *node_order, pal_arena *arena,
+pal_err pal_hex_single_make(const pal_elastic_hexes *cubes, const pal_body *body, pal_arena *arena,
                             pal_elastic_hexes_single *out)
 {
     const size_t n = PAL_LANES * (size_t)cubes->n_block;
-    *out = (pal_elastic_hexes_single){.cubes = cubes, .n_slot = node_order->n_slot};
+    *out = (pal_elastic_hexes_single){.cubes = cubes, .n_slot = body->node_order->n_slot};
+    PAL_TRY(pal_block_rounds_make(&cubes->simd_blocks, body->x_rest, body->n_node, cubes->edge_m, cubes->hexes->node,
+                                  cubes->n_hex, arena, &out->rounds));
     out->stiff = PAL_NEW(arena, float, 2 * n);
     if (cubes->law != PAL_LAW_LINEAR) out->rotation = PAL_NEW(arena, float, 9 * n);
     return out->stiff && (out->rotation || cubes->law == PAL_LAW_LINEAR) ? PAL_ERR_OK : PAL_ERR_MEMORY;
@@ -74,29 +78,58 @@ PAL_INLINE void multiply_block(const pal_elastic_hexes_single *single, int block
     for (int i = 0; i < 3; i++) unwalsh(u[i]);
 }
 
-void pal_hex_single_multiply(const pal_elastic_hexes_single *single, const float *p, float *out)
+typedef struct product {
+    const pal_elastic_hexes_single *single;
+    const float *p;
+    float *out;
+    int part; /* first of the round */
+} product;
+
+static void multiply_strip(const product *to, int b)
 {
-    const pal_simd_blocks *blocks = &single->cubes->simd_blocks;
-    const size_t n_slot = (size_t)single->n_slot;
-    for (int b = 0; b < blocks->n_strip; b++) {
-        const int32_t *base = blocks->base + 8 * b;
-        pal_single8 u[3][8];
-        for (size_t d = 0; d < 3; d++)
-            for (int c = 0; c < 8; c++) u[d][c] = load(p + d * n_slot + base[c]);
-        multiply_block(single, b, u);
-        for (size_t d = 0; d < 3; d++)
-            for (int c = 0; c < 8; c++) add(out + d * n_slot + base[c], u[d][c]);
-    }
-    for (int b = 0; b < blocks->n_loose; b++) {
-        const int32_t *node = blocks->node + 8 * PAL_LANES * b;
-        pal_single8 u[3][8];
-        for (size_t d = 0; d < 3; d++)
-            for (int c = 0; c < 8; c++)
-                for (int l = 0; l < PAL_LANES; l++) u[d][c][l] = p[d * n_slot + (size_t)node[PAL_LANES * c + l]];
-        multiply_block(single, blocks->n_strip + b, u);
-        for (size_t d = 0; d < 3; d++)
-            for (int c = 0; c < 8; c++)
-                for (int l = 0; l < PAL_LANES; l++) out[d * n_slot + (size_t)node[PAL_LANES * c + l]] += u[d][c][l];
+    const int32_t *base = to->single->cubes->simd_blocks.base + 8 * b;
+    const size_t n_slot = (size_t)to->single->n_slot;
+    pal_single8 u[3][8];
+    for (size_t d = 0; d < 3; d++)
+        for (int c = 0; c < 8; c++) u[d][c] = load(to->p + d * n_slot + base[c]);
+    multiply_block(to->single, b, u);
+    for (size_t d = 0; d < 3; d++)
+        for (int c = 0; c < 8; c++) add(to->out + d * n_slot + base[c], u[d][c]);
+}
+
+static void multiply_loose(const product *to, int b)
+{
+    const int32_t *node = pal_block_nodes(&to->single->cubes->simd_blocks, b);
+    const size_t n_slot = (size_t)to->single->n_slot;
+    pal_single8 u[3][8];
+    for (size_t d = 0; d < 3; d++)
+        for (int c = 0; c < 8; c++)
+            for (int l = 0; l < PAL_LANES; l++) u[d][c][l] = to->p[d * n_slot + (size_t)node[PAL_LANES * c + l]];
+    multiply_block(to->single, b, u);
+    for (size_t d = 0; d < 3; d++)
+        for (int c = 0; c < 8; c++)
+            for (int l = 0; l < PAL_LANES; l++) to->out[d * n_slot + (size_t)node[PAL_LANES * c + l]] += u[d][c][l];
+}
+
+static void multiply_part(void *user, int worker, int index)
+{
+    const product *to = user;
+    const pal_block_rounds *rounds = &to->single->rounds;
+    const int n_strip = to->single->cubes->simd_blocks.n_strip;
+    (void)worker;
+    for (int k = rounds->first[to->part + index]; k < rounds->first[to->part + index + 1]; k++)
+        if (rounds->order[k] < n_strip)
+            multiply_strip(to, rounds->order[k]);
+        else
+            multiply_loose(to, rounds->order[k]);
+}
+
+void pal_hex_single_multiply(const pal_elastic_hexes_single *single, pal_team *team, const float *p, float *out)
+{
+    const pal_block_rounds *rounds = &single->rounds;
+    for (int k = 0; k < rounds->n_round; k++) {
+        product job = {.single = single, .p = p, .out = out, .part = rounds->part[k]};
+        pal_team_run(team, rounds->part[k + 1] - rounds->part[k], multiply_part, &job);
     }
 }
 

@@ -2,12 +2,15 @@
 #include "server/sim/implicit/hex_multigrid.h"
 
 #include "server/base/heap.h"
+#include "server/base/subnormals.h"
 #include "server/mesh/volume/cell_hierarchy.h"
-#include "server/num/subnormals.h"
 #include "server/sim/implicit/tuning.h"
 
 #include <math.h>
 #include <string.h>
+
+/* groups of slots, and nodes, of a piece of work of a thread: some five microseconds */
+enum { GROUPS = 96, NODES = 512 };
 
 typedef float vec8 __attribute__((vector_size(32)));
 typedef float vec8_memory __attribute__((vector_size(32), aligned(4), may_alias));
@@ -64,7 +67,7 @@ pal_err pal_hex_multigrid_make(const pal_body *body, const pal_elastic_hexes *cu
 {
     *out = (pal_hex_multigrid){.body = body, .cubes = cubes, .grid = grid, .n_slot = body->node_order->n_slot};
     const size_t n = (size_t)out->n_slot;
-    PAL_TRY(pal_hex_single_make(cubes, body->node_order, arena, &out->single));
+    PAL_TRY(pal_hex_single_make(cubes, body, arena, &out->single));
     if (out->single.rotation) {
         out->turned = PAL_NEW(arena, float, 9 * PAL_LANES * (size_t)cubes->n_block);
         if (!out->turned) return PAL_ERR_MEMORY;
@@ -73,7 +76,9 @@ pal_err pal_hex_multigrid_make(const pal_body *body, const pal_elastic_hexes *cu
     out->weight = PAL_NEW(arena, float, n), out->inverse = PAL_NEW(arena, float, n);
     out->x = PAL_NEW(arena, float, 3 * n), out->b = PAL_NEW(arena, float, 3 * n), out->d = PAL_NEW(arena, float, 3 * n);
     out->r = PAL_NEW(arena, float, 3 * n), out->q = PAL_NEW(arena, float, 3 * n);
-    if (!out->weight || !out->inverse || !out->x || !out->b || !out->d || !out->r || !out->q) return PAL_ERR_MEMORY;
+    out->part = PAL_NEW(arena, float, 4 * (size_t)body->n_node);
+    if (!out->weight || !out->inverse || !out->x || !out->b || !out->d || !out->r || !out->q || !out->part)
+        return PAL_ERR_MEMORY;
     PAL_TRY(pal_multigrid_create(grid, &out->coarse));
     pal_spare_thread_init(&out->spare_thread);
     return PAL_ERR_OK;
@@ -90,44 +95,64 @@ void pal_hex_multigrid_destroy(pal_hex_multigrid *mg)
 
 /* ---- finest level ---- */
 
-/* q = A p */
-static void multiply(const pal_hex_multigrid *mg, const float *p, float *q)
+/* q = A p, where q is weight p already */
+static void multiply(const pal_hex_multigrid *mg, const float *p)
 {
-    for (int g = 0; g < mg->n_group; g++) {
-        const size_t at = (size_t)mg->group[g], n = (size_t)mg->n_slot;
-        const vec8 weight = load(mg->weight + at);
-        for (size_t i = at; i < 3 * n; i += n) store(q + i, weight * load(p + i));
-    }
-    pal_hex_single_multiply(&mg->single, p, q);
+    pal_hex_single_multiply(&mg->single, mg->body->team, p, mg->q);
 }
 
-/* x = the smoother's answer, from 0 or from x */
-static void smooth(const pal_hex_multigrid *mg, bool from_zero)
+/* one step of the smoother on a piece of the groups of slots: r, d, x, and q = weight times what is multiplied next */
+typedef struct pass {
+    const pal_hex_multigrid *mg;
+    enum { FROM_ZERO, FROM_X, STEP } what;
+    bool last;
+    float keep, take, weight;
+} pass;
+
+static void pass_groups(void *user, int worker, int index)
 {
+    const pass *p = user;
+    const pal_hex_multigrid *mg = p->mg;
     const size_t n = (size_t)mg->n_slot;
-    const float first = 4 / (3 * mg->lambda), weight = pal_chebyshev_weight[0];
-    if (!from_zero) multiply(mg, mg->x, mg->q);
-    for (int g = 0; g < mg->n_group; g++) {
+    const int first = index * GROUPS, end = first + GROUPS < mg->n_group ? first + GROUPS : mg->n_group;
+    (void)worker;
+    for (int g = first; g < end; g++) {
         const size_t at = (size_t)mg->group[g];
-        const vec8 inverse = first * load(mg->inverse + at);
+        const vec8 take = p->take * load(mg->inverse + at), weight = load(mg->weight + at);
         for (size_t i = at; i < 3 * n; i += n) {
-            const vec8 r = from_zero ? load(mg->b + i) : load(mg->b + i) - load(mg->q + i), d = inverse * r;
-            store(mg->r + i, r), store(mg->d + i, d);
-            store(mg->x + i, from_zero ? weight * d : load(mg->x + i) + weight * d);
+            vec8 r = load((p->what == STEP ? mg->r : mg->b) + i), x = {0};
+            if (p->what != FROM_ZERO) r -= load(mg->q + i), x = load(mg->x + i);
+            vec8 d = take * r;
+            if (p->what == STEP) d += p->keep * load(mg->d + i);
+            x += p->weight * d;
+            store(mg->r + i, r), store(mg->d + i, d), store(mg->x + i, x);
+            store(mg->q + i, weight * (p->last ? x : d));
         }
     }
+}
+
+static void run_pass(pass *p)
+{
+    const pal_hex_multigrid *mg = p->mg;
+    pal_team_run(mg->body->team, (mg->n_group + GROUPS - 1) / GROUPS, pass_groups, p);
+}
+
+/* x = the smoother's answer, from 0 or from x, with q = weight x before and after */
+static void smooth(const pal_hex_multigrid *mg, bool from_zero)
+{
+    if (!from_zero) multiply(mg, mg->x);
+    run_pass(&(pass){.mg = mg,
+                     .what = from_zero ? FROM_ZERO : FROM_X,
+                     .take = 4 / (3 * mg->lambda),
+                     .weight = pal_chebyshev_weight[0]});
     for (int k = 1; k < PAL_CHEBYSHEV_DEGREE; k++) {
-        const float keep = pal_chebyshev_keep(k), take = pal_chebyshev_take(k) / mg->lambda;
-        multiply(mg, mg->d, mg->q);
-        for (int g = 0; g < mg->n_group; g++) {
-            const size_t at = (size_t)mg->group[g];
-            const vec8 inverse = take * load(mg->inverse + at);
-            for (size_t i = at; i < 3 * n; i += n) {
-                const vec8 r = load(mg->r + i) - load(mg->q + i), d = keep * load(mg->d + i) + inverse * r;
-                store(mg->r + i, r), store(mg->d + i, d);
-                store(mg->x + i, load(mg->x + i) + pal_chebyshev_weight[k] * d);
-            }
-        }
+        multiply(mg, mg->d);
+        run_pass(&(pass){.mg = mg,
+                         .what = STEP,
+                         .last = k == PAL_CHEBYSHEV_DEGREE - 1,
+                         .keep = pal_chebyshev_keep(k),
+                         .take = pal_chebyshev_take(k) / mg->lambda,
+                         .weight = pal_chebyshev_weight[k]});
     }
 }
 
@@ -140,58 +165,104 @@ static void turn(const double *w, const float *v, bool back, float *to)
     }
 }
 
+/* the way between nodes and slots, for a piece of the nodes */
+typedef struct transfer {
+    pal_hex_multigrid *mg;
+    const pal_warp *warp;
+    const double *in;
+    double *out, scale;
+    enum { TAKE, RESTRICT, PROLONG, GIVE } what;
+} transfer;
+
+/* part [n_node][4] = what the residual b - A x at the node is to each node that it is interpolated from */
+static void restrict_node(const transfer *t, int i, size_t at)
+{
+    const pal_hex_multigrid *mg = t->mg;
+    const size_t n = (size_t)mg->n_slot;
+    const float part = 1 / (float)(mg->grid->level[0].start[i + 1] - mg->grid->level[0].start[i]);
+    float v[3], *to = mg->part + 4 * i;
+    for (size_t c = 0; c < 3; c++) v[c] = part * (mg->b[at + c * n] - mg->q[at + c * n]);
+    if (t->warp->rotated)
+        turn(t->warp->w + 9 * i, v, true, to);
+    else
+        memcpy(to, v, sizeof v);
+}
+
+/* x += the mean of the coarse answer, turned; q = weight x */
+static void prolong_node(const transfer *t, int i, size_t at)
+{
+    const pal_hex_multigrid *mg = t->mg;
+    const pal_grid_level *grid = &mg->grid->level[0];
+    const size_t n = (size_t)mg->n_slot;
+    const float *x = pal_multigrid_answer(mg->coarse);
+    float v[3] = {0, 0, 0}, turned[3];
+    for (int k = grid->start[i]; k < grid->start[i + 1]; k++)
+        for (int c = 0; c < 3; c++) v[c] += x[4 * grid->from[k] + c];
+    if (t->warp->rotated)
+        turn(t->warp->w + 9 * i, v, false, turned);
+    else
+        memcpy(turned, v, sizeof v);
+    for (size_t c = 0; c < 3; c++) {
+        mg->x[at + c * n] += turned[c] / (float)(grid->start[i + 1] - grid->start[i]);
+        mg->q[at + c * n] = mg->weight[at] * mg->x[at + c * n];
+    }
+}
+
+static void transfer_nodes(void *user, int worker, int index)
+{
+    const transfer *t = user;
+    const pal_hex_multigrid *mg = t->mg;
+    const int32_t *slot = mg->body->node_order->slot, *start = mg->grid->level[0].start;
+    const size_t n = (size_t)mg->n_slot;
+    const int first = index * NODES, end = first + NODES < mg->body->n_node ? first + NODES : mg->body->n_node;
+    (void)worker;
+    for (int i = first; i < end; i++) {
+        const size_t at = (size_t)slot[i];
+        const bool held = start[i] == start[i + 1];
+        for (size_t c = 0; c < 3 && t->what == TAKE; c++) mg->b[at + c * n] = (float)(t->scale * t->in[3 * i + (int)c]);
+        for (size_t c = 0; c < 3 && t->what == GIVE; c++) t->out[3 * i + (int)c] = t->scale * (double)mg->x[at + c * n];
+        if (t->what == RESTRICT && !held) restrict_node(t, i, at);
+        if (t->what == PROLONG && !held) prolong_node(t, i, at);
+    }
+}
+
+static void run_transfer(transfer *t)
+{
+    const pal_body *body = t->mg->body;
+    pal_team_run(body->team, (body->n_node + NODES - 1) / NODES, transfer_nodes, t);
+}
+
 /* the coarse levels' part: x += W P A1^-1 P' W' (b - A x) */
-static void correct(const pal_hex_multigrid *mg, const pal_warp *warp)
+static void correct(pal_hex_multigrid *mg, const pal_warp *warp)
 {
     const pal_grid_level *grid = &mg->grid->level[0];
-    const int32_t *slot = mg->body->node_order->slot;
-    const size_t n = (size_t)mg->n_slot;
     float *b = pal_multigrid_right_side(mg->coarse);
-    multiply(mg, mg->x, mg->q);
+    transfer t = {.mg = mg, .warp = warp, .what = RESTRICT};
+    multiply(mg, mg->x);
+    run_transfer(&t);
     memset(b, 0, 4 * sizeof *b * (size_t)grid->n_node);
-    for (int i = 0; i < mg->body->n_node; i++) {
-        const int32_t *from = grid->from + grid->start[i];
-        const int n_from = grid->start[i + 1] - grid->start[i];
-        const float part = 1 / (float)n_from;
-        if (n_from == 0) continue;
-        float v[3];
-        for (size_t c = 0, at = (size_t)slot[i]; c < 3; c++, at += n) v[c] = mg->b[at] - mg->q[at];
-        if (warp->rotated) turn(warp->w + 9 * i, (float[]){v[0], v[1], v[2]}, true, v);
-        for (int k = 0; k < n_from; k++)
-            for (int c = 0; c < 3; c++) b[4 * from[k] + c] += part * v[c];
-    }
-    pal_multigrid_cycle(mg->coarse);
-    const float *x = pal_multigrid_answer(mg->coarse);
-    for (int i = 0; i < mg->body->n_node; i++) {
-        const int32_t *from = grid->from + grid->start[i];
-        const int n_from = grid->start[i + 1] - grid->start[i];
-        if (n_from == 0) continue;
-        float v[3] = {0, 0, 0};
-        for (int k = 0; k < n_from; k++)
-            for (int c = 0; c < 3; c++) v[c] += x[4 * from[k] + c];
-        if (warp->rotated) turn(warp->w + 9 * i, (float[]){v[0], v[1], v[2]}, false, v);
-        for (size_t c = 0, at = (size_t)slot[i]; c < 3; c++, at += n) mg->x[at] += v[c] / (float)n_from;
-    }
+    for (int i = 0; i < mg->body->n_node; i++)
+        for (int k = grid->start[i]; k < grid->start[i + 1]; k++)
+            for (int c = 0; c < 4; c++) b[4 * grid->from[k] + c] += mg->part[4 * i + c];
+    pal_multigrid_cycle(mg->coarse, mg->body->team);
+    t.what = PROLONG;
+    run_transfer(&t);
 }
 
 void pal_hex_multigrid_solve(pal_hex_multigrid *mg, const pal_warp *warp, const double *r, double *z)
 {
-    const int32_t *slot = mg->body->node_order->slot;
-    const size_t n = (size_t)mg->n_slot;
     double largest = 0;
-    for (int i = 0; i < 3 * mg->body->n_node; i++) largest = fmax(largest, fabs(r[i]));
+    for (int i = 0; i < 3 * mg->body->n_node; i++) largest = fabs(r[i]) > largest ? fabs(r[i]) : largest;
     if (!(largest > 0) || !isfinite(largest)) {
         memset(z, 0, pal_body_bytes3(mg->body));
         return;
     }
     const unsigned mode = pal_subnormals_flush();
-    for (int i = 0; i < mg->body->n_node; i++)
-        for (size_t c = 0; c < 3; c++) mg->b[(size_t)slot[i] + c * n] = (float)(r[3 * i + (int)c] / largest);
+    run_transfer(&(transfer){.mg = mg, .warp = warp, .in = r, .scale = 1 / largest, .what = TAKE});
     smooth(mg, true);
     correct(mg, warp);
     smooth(mg, false);
-    for (int i = 0; i < mg->body->n_node; i++)
-        for (size_t c = 0; c < 3; c++) z[3 * i + (int)c] = largest * (double)mg->x[(size_t)slot[i] + c * n];
+    run_transfer(&(transfer){.mg = mg, .warp = warp, .out = z, .scale = largest, .what = GIVE});
     pal_subnormals_restore(mode);
 }
 
@@ -263,12 +334,13 @@ static void find_lambda(pal_hex_multigrid *mg)
         }
     double lambda = 1, size = size_of(mg, mg->d);
     for (int k = 0; k < PAL_POWER_ITERATIONS && size > 0 && isfinite(size); k++) {
-        multiply(mg, mg->d, mg->q);
-        for (int g = 0; g < mg->n_group; g++) {
-            const size_t at = (size_t)mg->group[g];
-            for (size_t i = at; i < 3 * n; i += n)
-                store(mg->d + i, load(mg->q + i) * load(mg->inverse + at) * (float)(1 / size));
-        }
+        for (int g = 0; g < mg->n_group; g++)
+            for (size_t i = (size_t)mg->group[g]; i < 3 * n; i += n)
+                store(mg->q + i, load(mg->weight + mg->group[g]) * load(mg->d + i));
+        multiply(mg, mg->d);
+        for (int g = 0; g < mg->n_group; g++)
+            for (size_t i = (size_t)mg->group[g]; i < 3 * n; i += n)
+                store(mg->d + i, load(mg->q + i) * load(mg->inverse + mg->group[g]) * (float)(1 / size));
         lambda = size = size_of(mg, mg->d);
     }
     mg->lambda = (float)(PAL_CHEBYSHEV_SAFE * lambda);

@@ -26,6 +26,7 @@ typedef struct pal_hex_multigrid {
     int32_t *group;           /* first slot [n_group] */
     float *weight, *inverse;  /* mass M; 1 / D, 0 at fixed nodes and empty slots [n_slot] */
     float *x, *b, *d, *r, *q; /* answer, right side, direction, residual, product [3][n_slot] */
+    float *part;              /* of residuals at nodes, x y z 0 [n_node][4] */
 } pal_hex_multigrid;
 
 /* levels of the body, shared by all its preconditioners; n_level 0: it is too small. MEMORY. [load] */

@@ -197,7 +197,9 @@ static pal_err create(pal_world *w, const pal_scene *scene, pal_diagnostic *diag
     if (!w->arena) return PAL_ERR_MEMORY;
     w->step_s = scene->step_s;
     w->max_substep = scene->max_substep;
+    if (scene->threads > 1) PAL_TRY(pal_team_create(scene->threads, &w->team));
     PAL_TRY(pal_plan_build(scene, w->arena, diag, &w->plan));
+    for (int b = 0; b < w->plan.n_body; b++) w->plan.body[b].team = w->team;
     w->scratch = pal_arena_create(w->plan.scratch_byte + 64, false);
     if (!w->scratch) return PAL_ERR_MEMORY;
     w->tools.n_tool = scene->n_tool;
@@ -235,6 +237,7 @@ void pal_world_destroy(pal_world *world)
 {
     if (!world) return;
     pal_plan_free(&world->plan);
+    pal_team_destroy(world->team);
     pal_arena_destroy(world->scratch);
     pal_arena_destroy(world->arena);
     free(world);
@@ -426,8 +429,10 @@ pal_err pal_world_step(pal_world *world, double dt_s)
     for (int t = 0; t < w->tools.n_tool; t++)
         pal_tool_begin_step(&w->tools.tool[t], w->has_requested_pose[t] ? &w->requested_pose[t] : NULL, dt_s);
     w->component_err = PAL_ERR_OK;
+    pal_team_hold(w->team);
     begin_step(w, dt_s);
     run_substeps(w, dt_s);
+    pal_team_release(w->team);
     pal_tools_end_step(&w->tools, w->n_substep);
     w->tick++;
     w->time_s += dt_s;

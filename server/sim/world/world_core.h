@@ -1,12 +1,14 @@
 /* The record of a world, for the files of sim/world and sim/transfer only. */
 #ifndef PAL_SIM_WORLD_WORLD_CORE_H
 #define PAL_SIM_WORLD_WORLD_CORE_H
+#include "server/base/team.h"
 #include "server/sim/plan/plan.h"
 #include "server/sim/world/inserted_components.h"
 #include "server/sim/world/shown_surface.h"
 
 typedef struct pal_world {
     pal_arena *arena, *scratch;
+    pal_team *team; /* NULL: steps take the caller's thread alone */
     pal_plan plan;
     pal_tools tools;
     pal_pose requested_pose[PAL_TOOL_MAX];

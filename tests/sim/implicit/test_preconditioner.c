@@ -187,6 +187,30 @@ static void fresh_levels_save_iterations(void)
     CHECK_NEAR(mean[1], mean[2], 0);
 }
 
+/* the same positions, bit for bit, with one thread and with several */
+static void threads_do_not_change_a_bit(void)
+{
+    double *first = NULL;
+    for (int threads = 1; threads <= 3; threads++) {
+        fem_beam b;
+        beam_reference(&b, 8);
+        beam_element(&b, "hex8_bbar", "corotational");
+        b.scene->threads = threads;
+        REQUIRE(!beam_open(&b, &diag));
+        beam_load_end(&b, 800);
+        for (int i = 0; i < 12; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
+        const size_t n_byte = 3 * sizeof *first * (size_t)b.body->n_node;
+        if (threads == 1) {
+            first = malloc(n_byte);
+            REQUIRE(first != NULL);
+            memcpy(first, b.body->x, n_byte);
+        }
+        CHECK(memcmp(first, b.body->x, n_byte) == 0);
+        beam_free(&b);
+    }
+    free(first);
+}
+
 static void an_application_is_symmetric_and_positive(void)
 {
     fem_beam b;
@@ -305,6 +329,7 @@ int main(void)
     RUN(hard_cases_converge);
     RUN(a_bent_beam_needs_few_iterations);
     RUN(fresh_levels_save_iterations);
+    RUN(threads_do_not_change_a_bit);
     RUN(an_application_is_symmetric_and_positive);
     RUN(the_choice_follows_size_elements_and_contrast);
     RUN(what_it_cannot_do_is_refused);
