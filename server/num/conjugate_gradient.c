@@ -3,7 +3,11 @@
 #include <math.h>
 #include <string.h>
 
-double pal_dot_product(int n, const double *a, const double *b)
+/* numbers of a chunk: some five microseconds of a thread; and chunks that are summed side by side, which bounds the
+ * memory of their sums */
+enum { CHUNK = 16384, CHUNKS = 256 };
+
+static double chunk_product(int n, const double *a, const double *b)
 {
     double lane[8] = {0}, sum = 0;
     int i = 0;
@@ -13,37 +17,85 @@ double pal_dot_product(int n, const double *a, const double *b)
     return sum + ((lane[0] + lane[4]) + (lane[2] + lane[6])) + ((lane[1] + lane[5]) + (lane[3] + lane[7]));
 }
 
-/* x += alpha p, r -= alpha q; returns r'r */
-static double go(int n, double alpha, const double *p, const double *q, double *x, double *r)
+/* what is done with each chunk of the vectors */
+typedef struct pass {
+    enum { PRODUCT, DIRECTION, ADVANCE } what;
+    int n;
+    const double *a, *b;
+    pal_conjugate_gradient *cg;
+    double *x, beta, alpha;
+    int begin;          /* first chunk of those that are side by side */
+    double sum[CHUNKS]; /* of each of them */
+} pass;
+
+static void pass_chunk(void *user, int worker, int index)
 {
-    for (int i = 0; i < n; i++) {
-        x[i] += alpha * p[i];
-        r[i] -= alpha * q[i];
+    pass *p = user;
+    const int first = (p->begin + index) * CHUNK, n = p->n - first < CHUNK ? p->n - first : CHUNK;
+    (void)worker;
+    if (p->what == PRODUCT) {
+        p->sum[index] = chunk_product(n, p->a + first, p->b + first);
+        return;
     }
-    return pal_dot_product(n, r, r);
+    const double *q = p->cg->q + first, *z = p->cg->z + first;
+    double *r = p->cg->r + first, *d = p->cg->p + first;
+    for (int i = 0; i < n && p->what == DIRECTION; i++) d[i] = z[i] + p->beta * d[i];
+    if (p->what == DIRECTION) return;
+    for (int i = 0; i < n; i++) {
+        p->x[first + i] += p->alpha * d[i];
+        r[i] -= p->alpha * q[i];
+    }
+    p->sum[index] = chunk_product(n, r, r);
+}
+
+/* returns the sum over all chunks */
+static double run_pass(pass *p, pal_team *team)
+{
+    const int n_chunk = (p->n + CHUNK - 1) / CHUNK;
+    double sum = 0;
+    for (p->begin = 0; p->begin < n_chunk; p->begin += CHUNKS) {
+        const int n = n_chunk - p->begin < CHUNKS ? n_chunk - p->begin : CHUNKS;
+        pal_team_run(team, n, pass_chunk, p);
+        for (int k = 0; k < n && p->what != DIRECTION; k++) sum += p->sum[k];
+    }
+    return sum;
+}
+
+static double product(pal_team *team, int n, const double *a, const double *b)
+{
+    pass p = {.what = PRODUCT, .n = n, .a = a, .b = b};
+    return run_pass(&p, team);
+}
+
+double pal_dot_product(int n, const double *a, const double *b)
+{
+    return product(NULL, n, a, b);
 }
 
 int pal_conjugate_gradient_run(pal_conjugate_gradient *cg, double *x, double target, int min, int max)
 {
     const int n = cg->n;
-    double rr = pal_dot_product(n, cg->r, cg->r), rz_old = 0, alpha = 0;
+    double rr = product(cg->team, n, cg->r, cg->r), rz_old = 0;
+    pass p = {.n = n, .cg = cg, .x = x};
     int done = 0;
     while (done < max && rr > 0 && (done < min || rr > target * target)) {
         cg->precondition(cg->user, cg->r, cg->z);
-        double rz = pal_dot_product(n, cg->r, cg->z);
+        double rz = product(cg->team, n, cg->r, cg->z);
         if (!(rz > 0) || !isfinite(rz)) break;
         /* z'(r - r of before) / (z'r of before), and r of before is r + alpha q */
-        double beta = done > 0 ? -alpha * pal_dot_product(n, cg->z, cg->q) / rz_old : 0;
+        p.beta = done > 0 ? -p.alpha * product(cg->team, n, cg->z, cg->q) / rz_old : 0;
+        p.what = DIRECTION;
         if (done == 0)
             memcpy(cg->p, cg->z, sizeof(double) * (size_t)n);
         else
-            for (int i = 0; i < n; i++) cg->p[i] = cg->z[i] + beta * cg->p[i];
+            (void)run_pass(&p, cg->team);
         cg->multiply(cg->user, cg->p, cg->q);
-        double pq = pal_dot_product(n, cg->p, cg->q);
+        double pq = product(cg->team, n, cg->p, cg->q);
         if (!(pq > 0) || !isfinite(pq)) break;
-        alpha = rz / pq;
+        p.alpha = rz / pq;
         rz_old = rz;
-        rr = go(n, alpha, cg->p, cg->q, x, cg->r);
+        p.what = ADVANCE;
+        rr = run_pass(&p, cg->team);
         done++;
     }
     cg->residual = sqrt(rr);

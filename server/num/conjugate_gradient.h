@@ -3,12 +3,14 @@
  * from call to call (single precision) does no harm. No heap. Thread: any, one per struct. */
 #ifndef PAL_NUM_CONJUGATE_GRADIENT_H
 #define PAL_NUM_CONJUGATE_GRADIENT_H
+#include "server/base/team.h"
 
 typedef struct pal_conjugate_gradient {
     int n;                                                          /* unknowns */
     void (*multiply)(void *user, const double *p, double *out);     /* out = A p                      */
     void (*precondition)(void *user, const double *r, double *out); /* out ~ A^-1 r                    */
     void *user;
+    pal_team *team;    /* threads that share the sums; NULL: the caller's alone. The same bits with any number */
     double *r;         /* in: b - A x for the first guess x, out: of the last [n] */
     double *z, *p, *q; /* work [n]                                                */
     double residual;   /* out: |r|, Euclidean                                     */
@@ -18,6 +20,7 @@ typedef struct pal_conjugate_gradient {
  * is not finite or a direction has no positive curvature. Returns the number of iterations. */
 int pal_conjugate_gradient_run(pal_conjugate_gradient *cg, double *x, double target, int min, int max);
 
-/* dot product of n numbers in a fixed order, 8 partial sums: the same bits on every machine */
+/* dot product of n numbers in a fixed order, 8 partial sums in each of chunks of 16,384 numbers: the same bits on every
+ * machine */
 double pal_dot_product(int n, const double *a, const double *b);
 #endif

@@ -148,7 +148,8 @@ static char *scene_text(const pal_scene *scene)
                            {"anatomical_axes", scene->anatomical_axes[0] ? JSON_TEXT(scene->anatomical_axes) : NULL},
                            {"gravity_m_s2", gravity_acts(scene) ? pal_json_exact(scene->gravity_m_s2) : NULL},
                            {"max_substep", pal_json_exact(scene->max_substep)},
-                           {"threads", scene->threads > 0 ? pal_json_exact(scene->threads) : NULL}, {"bodies", bodies}, {"tools", tools});
+                           {"threads", scene->threads > 0 ? pal_json_exact(scene->threads) : NULL}, {"bodies", bodies},
+                           {"tools", tools});
     if (scene->keep_real_time) cJSON_AddTrueToObject(root, "keep_real_time");
     char *text = cJSON_Print(root);
     cJSON_Delete(root);

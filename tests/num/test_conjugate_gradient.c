@@ -41,7 +41,7 @@ static int solve(chain *c, double target, int min, int max, double *error, doubl
     double w[N], x[N] = {0}, r[N], z[N], p[N], q[N];
     for (int i = 0; i < N; i++) w[i] = 1 + i % 5;
     multiply(c, w, r);
-    pal_conjugate_gradient cg = {N, multiply, precondition, c, r, z, p, q, -1};
+    pal_conjugate_gradient cg = {N, multiply, precondition, c, NULL, r, z, p, q, -1};
     int n = pal_conjugate_gradient_run(&cg, x, target, min, max);
     *error = 0;
     for (int i = 0; i < N; i++) *error = fmax(*error, fabs(x[i] - w[i]));
@@ -106,7 +106,7 @@ static void stops_where_there_is_no_way_down(void)
     CHECK_INT(solve(&c, 1e-9, 0, 50, &error, &residual), 0);
     CHECK_NEAR(error, 5, 0); /* x is as it was */
     double zero[N] = {0}, x[N] = {0}, z[N], p[N], q[N];
-    pal_conjugate_gradient cg = {N, multiply, precondition, &c, zero, z, p, q, -1};
+    pal_conjugate_gradient cg = {N, multiply, precondition, &c, NULL, zero, z, p, q, -1};
     CHECK_INT(pal_conjugate_gradient_run(&cg, x, 0, 5, 50), 0);
     CHECK_NEAR(cg.residual, 0, 0);
 }

@@ -44,6 +44,7 @@ static pal_compliance_entry *find_known(pal_compliance_solver *solver, double si
 static bool solve_points(pal_compliance_solver *solver, const pal_body *body, double *move_m)
 {
     int n = solver->cg.n;
+    solver->cg.team = body->team;
     double *r = solver->cg.r, share;
     pal_system_clear_supported(body, r);
     memset(move_m, 0, pal_body_bytes3(body));

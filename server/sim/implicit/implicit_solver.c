@@ -408,6 +408,7 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
     pal_solve_report *to = &core->report;
     int max = core->options.newton;
     uint64_t again_ns = 0;
+    core->cg.team = body->team;
     set_factors(core, tau);
     core->sound = false;
     for (int i = 0; i < core->cg.n; i++) core->start[i] = (body->x[i] - core->xs[i]) / tau;

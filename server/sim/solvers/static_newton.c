@@ -526,6 +526,7 @@ static pal_err run(void *self, pal_step *step)
     static_newton *solver = self;
     pal_body *body = solver->system.body;
     if (!pal_guard_check_finite(body)) return PAL_ERR_OK;
+    solver->cg.team = body->team;
     if (step->sub == 0) solver->report.n_newton = solver->report.n_cg = 0;
     memcpy(solver->x0, body->x, pal_body_bytes3(solver->system.body));
     for (int i = 0; i < body->n_dof; i++) {
