@@ -90,6 +90,14 @@ static bool has_component(const pal_world *world, const char *name)
     return false;
 }
 
+/* how the body's solver is preconditioned; NULL: not at all */
+static cJSON *preconditioner_json(const pal_world *world, int body)
+{
+    pal_solve_report report;
+    if (!pal_world_solve_report(world, body, &report) || !report.preconditioner) return NULL;
+    return PAL_JSON({"kind", JSON_TEXT(report.preconditioner)}, {"reason", JSON_TEXT(report.preconditioner_reason)});
+}
+
 static cJSON *body_json(const pal_body_def *def, const pal_body *b)
 {
     const pal_adaptive_surface *adaptive = b->model.adaptive;
@@ -149,7 +157,8 @@ static cJSON *as_json(const pal_studied_scene *studied, pal_world *world, cost *
     double step_ms = pal_median(c->step_ms, c->n_step);
     cJSON *bodies = cJSON_CreateArray(), *components = cJSON_CreateArray();
     for (int b = 0; b < scene->n_body; b++)
-        cJSON_AddItemToArray(bodies, body_json(&scene->body[b], pal_world_body(world, b)));
+        cJSON_AddItemToArray(bodies, PAL_JSON_ADD(body_json(&scene->body[b], pal_world_body(world, b)),
+                                                  {"preconditioner", preconditioner_json(world, b)}));
     for (int k = 0; k < pal_world_component_count(world); k++) {
         pal_component_info info;
         pal_world_component_info(world, k, &info);
@@ -194,12 +203,23 @@ static void print_body(const pal_body_def *def, const pal_body *b)
     }
 }
 
+static void print_preconditioner(const pal_world *world, int body)
+{
+    pal_solve_report report;
+    if (!pal_world_solve_report(world, body, &report) || !report.preconditioner) return;
+    printf("  preconditioner: %s, %s\n", report.preconditioner,
+           report.preconditioner_reason[0] ? report.preconditioner_reason : "as the scene asks");
+}
+
 static void print(const pal_studied_scene *studied, pal_world *world, cost *c)
 {
     const pal_scene *scene = studied->scene;
     if (studied->summary[0]) printf("%s\n", studied->summary);
     if (studied->warn[0]) printf("%s\n", studied->warn);
-    for (int b = 0; b < scene->n_body; b++) print_body(&scene->body[b], pal_world_body(world, b));
+    for (int b = 0; b < scene->n_body; b++) {
+        print_body(&scene->body[b], pal_world_body(world, b));
+        print_preconditioner(world, b);
+    }
     printf("\n%-9s %-16s %-16s %10s %10s  %s\n", "stage", "component", "body", "kB", "ms a step", "called for by");
     for (int k = 0; k < pal_world_component_count(world); k++) {
         pal_component_info info;

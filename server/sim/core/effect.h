@@ -97,6 +97,8 @@ typedef struct pal_solve_report {
     double residual;  /* relative to the loads */
     double step_size; /* of the line search, 1: full */
     bool converged;   /* the tolerance was met */
+    const char *preconditioner; /* of an implicit solver: jacobi, factor, multigrid, incomplete; NULL: none */
+    const char *preconditioner_reason; /* why it was chosen, with numbers; "": it was asked for */
     int64_t factor_nonzeros;
     int n_factor; /* factorisations since load */
     /* time spent since load on the simulation thread: analysis of patterns, assembly of matrices, factorisation (but

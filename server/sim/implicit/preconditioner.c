@@ -69,19 +69,23 @@ static pal_err choose(pal_preconditioner *p, const pal_elastic_hexes *cubes, pal
 {
     const pal_body *body = p->system->body;
     p->kind = PAL_PRECONDITION_FACTOR;
-    if (!cubes || body->n_node < PAL_MULTIGRID_NODES_MIN) return PAL_ERR_OK;
+    if (!cubes)
+        snprintf(p->reason, sizeof p->reason, "its elements are no voxel hexahedra of linear or corotational law");
+    else if (body->n_node < PAL_MULTIGRID_NODES_MIN)
+        snprintf(p->reason, sizeof p->reason, "it has only %d nodes", body->n_node);
+    if (p->reason[0]) return PAL_ERR_OK;
     if (body->n_node < PAL_MULTIGRID_NODES) {
         PAL_TRY(analyse(p, NULL, arena));
         const double entries = (double)pal_cholesky_nonzeros(p->factor), stiff = contrast(cubes);
         snprintf(p->reason, sizeof p->reason,
-                 "a factor has %.1f million entries, the stiffest element is %.0f times the "
+                 "its factor has %.1f million entries, its stiffest element is %.0f times the "
                  "softest",
                  1e-6 * entries, stiff);
         if (entries < PAL_FACTOR_ENTRIES || stiff > PAL_MULTIGRID_CONTRAST) return PAL_ERR_OK;
         pal_cholesky_destroy(p->factor);
         p->factor = NULL;
     } else {
-        snprintf(p->reason, sizeof p->reason, "%d nodes are too many for a factor", body->n_node);
+        snprintf(p->reason, sizeof p->reason, "its %d nodes are too many for a factor", body->n_node);
     }
     PAL_TRY(make_grid(p, arena));
     if (p->grid->n_level > 0) p->kind = PAL_PRECONDITION_MULTIGRID;
@@ -261,6 +265,7 @@ void pal_preconditioner_solve(pal_preconditioner *p, const double *r, double *z)
 void pal_preconditioner_report(const pal_preconditioner *p, pal_solve_report *out)
 {
     out->assemble_s = p->system->assemble_s;
+    out->preconditioner = pal_precondition_name(p->kind), out->preconditioner_reason = p->reason;
     if (p->factor) out->factor_nonzeros = pal_cholesky_nonzeros(p->factor);
     out->n_factor = p->n_update;
     out->analyse_s = p->analyse_s;
