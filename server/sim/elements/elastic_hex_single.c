@@ -28,13 +28,13 @@ static const double *coefficients(const pal_elastic_hexes *cubes, int part)
     return cubes->recovery ? cubes->whole[part] : part == 0 ? cubes->mu : cubes->lambda;
 }
 
-void pal_hex_single_stiffen(pal_elastic_hexes_single *single, double k)
+void pal_hex_single_stiffen(pal_elastic_hexes_single *single)
 {
     for (int part = 0; part < 2; part++) {
         const double *from = coefficients(single->cubes, part);
         for (int b = 0; b < single->cubes->n_block; b++)
             for (int l = 0; l < PAL_LANES; l++)
-                single->stiff[(2 * b + part) * PAL_LANES + l] = (float)(k * from[PAL_LANES * b + l]);
+                single->stiff[(2 * b + part) * PAL_LANES + l] = (float)from[PAL_LANES * b + l];
     }
 }
 
@@ -64,11 +64,11 @@ PAL_INLINE void turn(const pal_single8 r[9], bool transposed, pal_single8 u[3][8
 }
 
 /* u becomes k K u of the eight elements of a block */
-PAL_INLINE void multiply_block(const pal_elastic_hexes_single *single, int block, pal_single8 u[3][8])
+PAL_INLINE void multiply_block(const pal_elastic_hexes_single *single, int block, float k, pal_single8 u[3][8])
 {
     const float *beta = (const float[]){(float)single->cubes->beta[0], (float)single->cubes->beta[1]};
-    const pal_single8 mu = load(single->stiff + 2 * PAL_LANES * block),
-                      lambda = load(single->stiff + (2 * block + 1) * PAL_LANES);
+    const pal_single8 mu = k * load(single->stiff + 2 * PAL_LANES * block),
+                      lambda = k * load(single->stiff + (2 * block + 1) * PAL_LANES);
     pal_single8 r[9];
     for (int i = 0; i < 3; i++) walsh(u[i]);
     for (int i = 0; i < 9 && single->rotation; i++) r[i] = load(single->rotation + (9 * block + i) * PAL_LANES);
@@ -80,6 +80,7 @@ PAL_INLINE void multiply_block(const pal_elastic_hexes_single *single, int block
 
 typedef struct product {
     const pal_elastic_hexes_single *single;
+    float k;
     const float *p;
     float *out;
     int part; /* first of the round */
@@ -92,7 +93,7 @@ static void multiply_strip(const product *to, int b)
     pal_single8 u[3][8];
     for (size_t d = 0; d < 3; d++)
         for (int c = 0; c < 8; c++) u[d][c] = load(to->p + d * n_slot + base[c]);
-    multiply_block(to->single, b, u);
+    multiply_block(to->single, b, to->k, u);
     for (size_t d = 0; d < 3; d++)
         for (int c = 0; c < 8; c++) add(to->out + d * n_slot + base[c], u[d][c]);
 }
@@ -105,7 +106,7 @@ static void multiply_loose(const product *to, int b)
     for (size_t d = 0; d < 3; d++)
         for (int c = 0; c < 8; c++)
             for (int l = 0; l < PAL_LANES; l++) u[d][c][l] = to->p[d * n_slot + (size_t)node[PAL_LANES * c + l]];
-    multiply_block(to->single, b, u);
+    multiply_block(to->single, b, to->k, u);
     for (size_t d = 0; d < 3; d++)
         for (int c = 0; c < 8; c++)
             for (int l = 0; l < PAL_LANES; l++) to->out[d * n_slot + (size_t)node[PAL_LANES * c + l]] += u[d][c][l];
@@ -124,12 +125,13 @@ static void multiply_part(void *user, int worker, int index)
             multiply_loose(to, rounds->order[k]);
 }
 
-void pal_hex_single_multiply(const pal_elastic_hexes_single *single, pal_team *team, const float *p, float *out)
+void pal_hex_single_multiply(const pal_elastic_hexes_single *single, pal_team *team, float k, const float *p,
+                             float *out)
 {
     const pal_block_rounds *rounds = &single->rounds;
-    for (int k = 0; k < rounds->n_round; k++) {
-        product job = {.single = single, .p = p, .out = out, .part = rounds->part[k]};
-        pal_team_run(team, rounds->part[k + 1] - rounds->part[k], multiply_part, &job);
+    for (int round = 0; round < rounds->n_round; round++) {
+        product job = {.single = single, .k = k, .p = p, .out = out, .part = rounds->part[round]};
+        pal_team_run(team, rounds->part[round + 1] - rounds->part[round], multiply_part, &job);
     }
 }
 
@@ -144,7 +146,8 @@ static void turn_block(const double r[9], const double k[9], double to[9])
                 part[i - i % 3 + 2] * r[3 * (i % 3) + 2];
 }
 
-void pal_hex_single_element(const pal_elastic_hexes_single *single, const float *rotation, int e, double to[24][24])
+void pal_hex_single_element(const pal_elastic_hexes_single *single, const float *rotation, int e, double k,
+                            double to[24][24])
 {
     const int place = single->cubes->simd_blocks.place[e], block = place / PAL_LANES, lane = place % PAL_LANES;
     const float *stiff = single->stiff + 2 * PAL_LANES * block + lane;
@@ -154,9 +157,10 @@ void pal_hex_single_element(const pal_elastic_hexes_single *single, const float 
     for (int c = 0; c < 8; c++)
         for (int d = c; d < 8; d++) {
             const double *part = single->cubes->reference[pal_hex_pair(c, d)][0];
-            double k[9];
-            for (int i = 0; i < 9; i++) k[i] = (double)stiff[0] * part[i] + (double)stiff[PAL_LANES] * part[9 + i];
-            if (trace < 3) turn_block(r, k, k);
-            for (int i = 0; i < 9; i++) to[3 * c + i / 3][3 * d + i % 3] = to[3 * d + i % 3][3 * c + i / 3] = k[i];
+            double a[9];
+            for (int i = 0; i < 9; i++)
+                a[i] = k * ((double)stiff[0] * part[i] + (double)stiff[PAL_LANES] * part[9 + i]);
+            if (trace < 3) turn_block(r, a, a);
+            for (int i = 0; i < 9; i++) to[3 * c + i / 3][3 * d + i % 3] = to[3 * d + i % 3][3 * c + i / 3] = a[i];
         }
 }

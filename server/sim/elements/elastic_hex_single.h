@@ -10,20 +10,22 @@ typedef struct pal_elastic_hexes_single {
     const pal_elastic_hexes *cubes;
     int n_slot;
     pal_block_rounds rounds;
-    float *stiff;    /* mu, lambda times k and h / 16, N/m                   [n_block][2][8] */
+    float *stiff;    /* mu, lambda times h / 16, N/m                   [n_block][2][8] */
     float *rotation; /* [n_block][9][8]; NULL: the law is linear */
 } pal_elastic_hexes_single;
 
 /* MEMORY. [load] */
 pal_err pal_hex_single_make(const pal_elastic_hexes *cubes, const pal_body *body, pal_arena *arena,
                             pal_elastic_hexes_single *out);
-/* takes the present material times k */
-void pal_hex_single_stiffen(pal_elastic_hexes_single *single, double k);
+/* takes the present material */
+void pal_hex_single_stiffen(pal_elastic_hexes_single *single);
 /* takes the rotations of the last linearise */
 void pal_hex_single_rotate(pal_elastic_hexes_single *single);
 /* out += k K p; empty slots of p are 0. team: NULL, or threads that share the work; the same bits with any number */
-void pal_hex_single_multiply(const pal_elastic_hexes_single *single, pal_team *team, const float *p, float *out);
+void pal_hex_single_multiply(const pal_elastic_hexes_single *single, pal_team *team, float k, const float *p,
+                             float *out);
 /* k K [24][24] of element e in corners and axes, turned by the rotation that `rotation` has for it, laid out as in
  * `single`; NULL: at rest */
-void pal_hex_single_element(const pal_elastic_hexes_single *single, const float *rotation, int e, double to[24][24]);
+void pal_hex_single_element(const pal_elastic_hexes_single *single, const float *rotation, int e, double k,
+                            double to[24][24]);
 #endif

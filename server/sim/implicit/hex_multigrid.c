@@ -26,7 +26,7 @@ static inline void store(float *at, vec8 a)
 
 /* ---- load ---- */
 
-pal_err pal_hex_grid_make(const pal_body *body, pal_arena *arena, pal_grid_hierarchy *out)
+static pal_err make_grid(const pal_body *body, pal_arena *arena, pal_grid_hierarchy *out)
 {
     const pal_hexes *hexes = body->hexes;
     const double h = body->tets->edge_m;
@@ -46,40 +46,47 @@ pal_err pal_hex_grid_make(const pal_body *body, pal_arena *arena, pal_grid_hiera
 }
 
 /* groups of slots with nodes */
-static pal_err find_groups(pal_hex_multigrid *mg, pal_arena *arena)
+static pal_err find_groups(pal_hex_levels *levels, pal_arena *arena)
 {
-    const pal_node_order *order = mg->body->node_order;
+    const pal_node_order *order = levels->body->node_order;
     uint8_t *used;
     pal_err err = PAL_ERR_OK;
-    PAL_ZEROED(&err, used, mg->n_slot / PAL_LANES + 1);
+    PAL_ZEROED(&err, used, levels->n_slot / PAL_LANES + 1);
     if (err) return err;
     for (int i = 0; i < order->n_node; i++) used[order->slot[i] / PAL_LANES] = 1;
-    for (int g = 0; g <= mg->n_slot / PAL_LANES; g++) mg->n_group += used[g];
-    mg->group = PAL_NEW(arena, int32_t, mg->n_group);
-    for (int g = 0, n = 0; g <= mg->n_slot / PAL_LANES && mg->group; g++)
-        if (used[g]) mg->group[n++] = PAL_LANES * g;
+    for (int g = 0; g <= levels->n_slot / PAL_LANES; g++) levels->n_group += used[g];
+    levels->group = PAL_NEW(arena, int32_t, levels->n_group);
+    for (int g = 0, n = 0; g <= levels->n_slot / PAL_LANES && levels->group; g++)
+        if (used[g]) levels->group[n++] = PAL_LANES * g;
     free(used);
-    return mg->group ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    return levels->group ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-pal_err pal_hex_multigrid_make(const pal_body *body, const pal_elastic_hexes *cubes, const pal_grid_hierarchy *grid,
-                               pal_arena *arena, pal_hex_multigrid *out)
+pal_err pal_hex_levels_make(const pal_body *body, const pal_elastic_hexes *cubes, pal_arena *arena, pal_hex_levels *out)
 {
-    *out = (pal_hex_multigrid){.body = body, .cubes = cubes, .grid = grid, .n_slot = body->node_order->n_slot};
-    const size_t n = (size_t)out->n_slot;
+    const size_t n = (size_t)body->node_order->n_slot;
+    *out = (pal_hex_levels){.body = body, .cubes = cubes, .n_slot = (int)n};
+    PAL_TRY(make_grid(body, arena, &out->grid));
+    if (out->grid.n_level == 0) return PAL_ERR_OK;
     PAL_TRY(pal_hex_single_make(cubes, body, arena, &out->single));
-    if (out->single.rotation) {
-        out->turned = PAL_NEW(arena, float, 9 * PAL_LANES * (size_t)cubes->n_block);
-        if (!out->turned) return PAL_ERR_MEMORY;
-    }
     PAL_TRY(find_groups(out, arena));
-    out->weight = PAL_NEW(arena, float, n), out->inverse = PAL_NEW(arena, float, n);
     out->x = PAL_NEW(arena, float, 3 * n), out->b = PAL_NEW(arena, float, 3 * n), out->d = PAL_NEW(arena, float, 3 * n);
     out->r = PAL_NEW(arena, float, 3 * n), out->q = PAL_NEW(arena, float, 3 * n);
     out->part = PAL_NEW(arena, float, 4 * (size_t)body->n_node);
-    if (!out->weight || !out->inverse || !out->x || !out->b || !out->d || !out->r || !out->q || !out->part)
-        return PAL_ERR_MEMORY;
-    PAL_TRY(pal_multigrid_create(grid, &out->coarse));
+    return out->x && out->b && out->d && out->r && out->q && out->part ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+pal_err pal_hex_multigrid_make(pal_hex_levels *levels, pal_arena *arena, pal_hex_multigrid *out)
+{
+    const size_t n = (size_t)levels->n_slot, n_lane = PAL_LANES * (size_t)levels->cubes->n_block;
+    *out = (pal_hex_multigrid){.levels = levels};
+    out->weight = PAL_NEW(arena, float, n), out->inverse = PAL_NEW(arena, float, n);
+    if (!out->weight || !out->inverse) return PAL_ERR_MEMORY;
+    if (levels->single.rotation) {
+        out->turned = PAL_NEW(arena, float, 9 * n_lane);
+        if (!out->turned) return PAL_ERR_MEMORY;
+    }
+    PAL_TRY(pal_multigrid_create(&levels->grid, &out->coarse));
     pal_spare_thread_init(&out->spare_thread);
     return PAL_ERR_OK;
 }
@@ -98,7 +105,7 @@ void pal_hex_multigrid_destroy(pal_hex_multigrid *mg)
 /* q = A p, where q is weight p already */
 static void multiply(const pal_hex_multigrid *mg, const float *p)
 {
-    pal_hex_single_multiply(&mg->single, mg->body->team, p, mg->q);
+    pal_hex_single_multiply(&mg->levels->single, mg->levels->body->team, mg->stiff, p, mg->levels->q);
 }
 
 /* one step of the smoother on a piece of the groups of slots: r, d, x, and q = weight times what is multiplied next */
@@ -113,20 +120,20 @@ static void pass_groups(void *user, int worker, int index)
 {
     const pass *p = user;
     const pal_hex_multigrid *mg = p->mg;
-    const size_t n = (size_t)mg->n_slot;
-    const int first = index * GROUPS, end = first + GROUPS < mg->n_group ? first + GROUPS : mg->n_group;
+    const size_t n = (size_t)mg->levels->n_slot;
+    const int first = index * GROUPS, end = first + GROUPS < mg->levels->n_group ? first + GROUPS : mg->levels->n_group;
     (void)worker;
     for (int g = first; g < end; g++) {
-        const size_t at = (size_t)mg->group[g];
+        const size_t at = (size_t)mg->levels->group[g];
         const vec8 take = p->take * load(mg->inverse + at), weight = load(mg->weight + at);
         for (size_t i = at; i < 3 * n; i += n) {
-            vec8 r = load((p->what == STEP ? mg->r : mg->b) + i), x = {0};
-            if (p->what != FROM_ZERO) r -= load(mg->q + i), x = load(mg->x + i);
+            vec8 r = load((p->what == STEP ? mg->levels->r : mg->levels->b) + i), x = {0};
+            if (p->what != FROM_ZERO) r -= load(mg->levels->q + i), x = load(mg->levels->x + i);
             vec8 d = take * r;
-            if (p->what == STEP) d += p->keep * load(mg->d + i);
+            if (p->what == STEP) d += p->keep * load(mg->levels->d + i);
             x += p->weight * d;
-            store(mg->r + i, r), store(mg->d + i, d), store(mg->x + i, x);
-            store(mg->q + i, weight * (p->last ? x : d));
+            store(mg->levels->r + i, r), store(mg->levels->d + i, d), store(mg->levels->x + i, x);
+            store(mg->levels->q + i, weight * (p->last ? x : d));
         }
     }
 }
@@ -134,19 +141,19 @@ static void pass_groups(void *user, int worker, int index)
 static void run_pass(pass *p)
 {
     const pal_hex_multigrid *mg = p->mg;
-    pal_team_run(mg->body->team, (mg->n_group + GROUPS - 1) / GROUPS, pass_groups, p);
+    pal_team_run(mg->levels->body->team, (mg->levels->n_group + GROUPS - 1) / GROUPS, pass_groups, p);
 }
 
 /* x = the smoother's answer, from 0 or from x, with q = weight x before and after */
 static void smooth(const pal_hex_multigrid *mg, bool from_zero)
 {
-    if (!from_zero) multiply(mg, mg->x);
+    if (!from_zero) multiply(mg, mg->levels->x);
     run_pass(&(pass){.mg = mg,
                      .what = from_zero ? FROM_ZERO : FROM_X,
                      .take = 4 / (3 * mg->lambda),
                      .weight = pal_chebyshev_weight[0]});
     for (int k = 1; k < PAL_CHEBYSHEV_DEGREE; k++) {
-        multiply(mg, mg->d);
+        multiply(mg, mg->levels->d);
         run_pass(&(pass){.mg = mg,
                          .what = STEP,
                          .last = k == PAL_CHEBYSHEV_DEGREE - 1,
@@ -178,10 +185,10 @@ typedef struct transfer {
 static void restrict_node(const transfer *t, int i, size_t at)
 {
     const pal_hex_multigrid *mg = t->mg;
-    const size_t n = (size_t)mg->n_slot;
-    const float part = 1 / (float)(mg->grid->level[0].start[i + 1] - mg->grid->level[0].start[i]);
-    float v[3], *to = mg->part + 4 * i;
-    for (size_t c = 0; c < 3; c++) v[c] = part * (mg->b[at + c * n] - mg->q[at + c * n]);
+    const size_t n = (size_t)mg->levels->n_slot;
+    const float part = 1 / (float)(mg->levels->grid.level[0].start[i + 1] - mg->levels->grid.level[0].start[i]);
+    float v[3], *to = mg->levels->part + 4 * i;
+    for (size_t c = 0; c < 3; c++) v[c] = part * (mg->levels->b[at + c * n] - mg->levels->q[at + c * n]);
     if (t->warp->rotated)
         turn(t->warp->w + 9 * i, v, true, to);
     else
@@ -192,8 +199,8 @@ static void restrict_node(const transfer *t, int i, size_t at)
 static void prolong_node(const transfer *t, int i, size_t at)
 {
     const pal_hex_multigrid *mg = t->mg;
-    const pal_grid_level *grid = &mg->grid->level[0];
-    const size_t n = (size_t)mg->n_slot;
+    const pal_grid_level *grid = &mg->levels->grid.level[0];
+    const size_t n = (size_t)mg->levels->n_slot;
     const float *x = pal_multigrid_answer(mg->coarse);
     float v[3] = {0, 0, 0}, turned[3];
     for (int k = grid->start[i]; k < grid->start[i + 1]; k++)
@@ -203,8 +210,8 @@ static void prolong_node(const transfer *t, int i, size_t at)
     else
         memcpy(turned, v, sizeof v);
     for (size_t c = 0; c < 3; c++) {
-        mg->x[at + c * n] += turned[c] / (float)(grid->start[i + 1] - grid->start[i]);
-        mg->q[at + c * n] = mg->weight[at] * mg->x[at + c * n];
+        mg->levels->x[at + c * n] += turned[c] / (float)(grid->start[i + 1] - grid->start[i]);
+        mg->levels->q[at + c * n] = mg->weight[at] * mg->levels->x[at + c * n];
     }
 }
 
@@ -212,15 +219,18 @@ static void transfer_nodes(void *user, int worker, int index)
 {
     const transfer *t = user;
     const pal_hex_multigrid *mg = t->mg;
-    const int32_t *slot = mg->body->node_order->slot, *start = mg->grid->level[0].start;
-    const size_t n = (size_t)mg->n_slot;
-    const int first = index * NODES, end = first + NODES < mg->body->n_node ? first + NODES : mg->body->n_node;
+    const int32_t *slot = mg->levels->body->node_order->slot, *start = mg->levels->grid.level[0].start;
+    const size_t n = (size_t)mg->levels->n_slot;
+    const int first = index * NODES,
+              end = first + NODES < mg->levels->body->n_node ? first + NODES : mg->levels->body->n_node;
     (void)worker;
     for (int i = first; i < end; i++) {
         const size_t at = (size_t)slot[i];
         const bool held = start[i] == start[i + 1];
-        for (size_t c = 0; c < 3 && t->what == TAKE; c++) mg->b[at + c * n] = (float)(t->scale * t->in[3 * i + (int)c]);
-        for (size_t c = 0; c < 3 && t->what == GIVE; c++) t->out[3 * i + (int)c] = t->scale * (double)mg->x[at + c * n];
+        for (size_t c = 0; c < 3 && t->what == TAKE; c++)
+            mg->levels->b[at + c * n] = (float)(t->scale * t->in[3 * i + (int)c]);
+        for (size_t c = 0; c < 3 && t->what == GIVE; c++)
+            t->out[3 * i + (int)c] = t->scale * (double)mg->levels->x[at + c * n];
         if (t->what == RESTRICT && !held) restrict_node(t, i, at);
         if (t->what == PROLONG && !held) prolong_node(t, i, at);
     }
@@ -228,23 +238,23 @@ static void transfer_nodes(void *user, int worker, int index)
 
 static void run_transfer(transfer *t)
 {
-    const pal_body *body = t->mg->body;
+    const pal_body *body = t->mg->levels->body;
     pal_team_run(body->team, (body->n_node + NODES - 1) / NODES, transfer_nodes, t);
 }
 
 /* the coarse levels' part: x += W P A1^-1 P' W' (b - A x) */
 static void correct(pal_hex_multigrid *mg, const pal_warp *warp)
 {
-    const pal_grid_level *grid = &mg->grid->level[0];
+    const pal_grid_level *grid = &mg->levels->grid.level[0];
     float *b = pal_multigrid_right_side(mg->coarse);
     transfer t = {.mg = mg, .warp = warp, .what = RESTRICT};
-    multiply(mg, mg->x);
+    multiply(mg, mg->levels->x);
     run_transfer(&t);
     memset(b, 0, 4 * sizeof *b * (size_t)grid->n_node);
-    for (int i = 0; i < mg->body->n_node; i++)
+    for (int i = 0; i < mg->levels->body->n_node; i++)
         for (int k = grid->start[i]; k < grid->start[i + 1]; k++)
-            for (int c = 0; c < 4; c++) b[4 * grid->from[k] + c] += mg->part[4 * i + c];
-    pal_multigrid_cycle(mg->coarse, mg->body->team);
+            for (int c = 0; c < 4; c++) b[4 * grid->from[k] + c] += mg->levels->part[4 * i + c];
+    pal_multigrid_cycle(mg->coarse, mg->levels->body->team);
     t.what = PROLONG;
     run_transfer(&t);
 }
@@ -252,9 +262,9 @@ static void correct(pal_hex_multigrid *mg, const pal_warp *warp)
 void pal_hex_multigrid_solve(pal_hex_multigrid *mg, const pal_warp *warp, const double *r, double *z)
 {
     double largest = 0;
-    for (int i = 0; i < 3 * mg->body->n_node; i++) largest = fabs(r[i]) > largest ? fabs(r[i]) : largest;
+    for (int i = 0; i < 3 * mg->levels->body->n_node; i++) largest = fabs(r[i]) > largest ? fabs(r[i]) : largest;
     if (!(largest > 0) || !isfinite(largest)) {
-        memset(z, 0, pal_body_bytes3(mg->body));
+        memset(z, 0, pal_body_bytes3(mg->levels->body));
         return;
     }
     const unsigned mode = pal_subnormals_flush();
@@ -271,8 +281,8 @@ void pal_hex_multigrid_solve(pal_hex_multigrid *mg, const pal_warp *warp, const 
 /* values of the coarser levels, of the rotations given */
 static pal_err fill_levels(const pal_hex_multigrid *mg, const float *rotation, pal_multigrid *to)
 {
-    const pal_grid_level *grid = &mg->grid->level[0];
-    const pal_body *body = mg->body;
+    const pal_grid_level *grid = &mg->levels->grid.level[0];
+    const pal_body *body = mg->levels->body;
     pal_multigrid_zero(to);
     for (int g = 0; g < grid->n_cell; g++) {
         double sum[24][24] = {{0}}, k[24][24];
@@ -280,7 +290,7 @@ static pal_err fill_levels(const pal_hex_multigrid *mg, const float *rotation, p
             const int e = grid->child[m];
             unsigned fixed = 0;
             for (int c = 0; c < 8; c++) fixed |= body->support[body->hexes->node[8 * e + c]] ? 1u << c : 0;
-            pal_hex_single_element(&mg->single, rotation, e, k);
+            pal_hex_single_element(&mg->levels->single, rotation, e, (double)mg->stiff, k);
             pal_multigrid_coarsen_cell(k, grid->octant[e], fixed, sum);
         }
         pal_multigrid_add_cell(to, g, sum);
@@ -292,13 +302,13 @@ static pal_err fill_levels(const pal_hex_multigrid *mg, const float *rotation, p
 /* masses and D of the finest level */
 static void fill_diagonal(pal_hex_multigrid *mg, double mass)
 {
-    const pal_body *body = mg->body;
+    const pal_body *body = mg->levels->body;
     const pal_hexes *hexes = body->hexes;
     const int32_t *slot = body->node_order->slot;
     double k[24][24];
-    memset(mg->inverse, 0, sizeof *mg->inverse * (size_t)mg->n_slot);
+    memset(mg->inverse, 0, sizeof *mg->inverse * (size_t)mg->levels->n_slot);
     for (int e = 0; e < hexes->n_hex; e++) {
-        pal_hex_single_element(&mg->single, NULL, e, k);
+        pal_hex_single_element(&mg->levels->single, NULL, e, (double)mg->stiff, k);
         for (int c = 0; c < 24; c += 3)
             mg->inverse[slot[hexes->node[8 * e + c / 3]]] += (float)((k[c][c] + k[c + 1][c + 1] + k[c + 2][c + 2]) / 3);
     }
@@ -312,11 +322,11 @@ static void fill_diagonal(pal_hex_multigrid *mg, double mass)
 /* the norm sqrt(d' D d), in which D^-1 A is symmetric */
 static double size_of(const pal_hex_multigrid *mg, const float *d)
 {
-    const int32_t *slot = mg->body->node_order->slot;
+    const int32_t *slot = mg->levels->body->node_order->slot;
     double sum = 0;
-    for (int i = 0; i < mg->body->n_node; i++)
+    for (int i = 0; i < mg->levels->body->n_node; i++)
         for (int c = 0; c < 3; c++) {
-            const size_t at = (size_t)slot[i] + (size_t)c * (size_t)mg->n_slot;
+            const size_t at = (size_t)slot[i] + (size_t)c * (size_t)mg->levels->n_slot;
             if (mg->inverse[slot[i]] > 0) sum += (double)(d[at] * d[at] / mg->inverse[slot[i]]);
         }
     return sqrt(sum);
@@ -325,52 +335,54 @@ static double size_of(const pal_hex_multigrid *mg, const float *d)
 /* largest eigenvalue of D^-1 A by power iteration */
 static void find_lambda(pal_hex_multigrid *mg)
 {
-    const int32_t *slot = mg->body->node_order->slot;
-    const size_t n = (size_t)mg->n_slot;
-    for (int i = 0; i < mg->body->n_node; i++)
+    const int32_t *slot = mg->levels->body->node_order->slot;
+    const size_t n = (size_t)mg->levels->n_slot;
+    for (int i = 0; i < mg->levels->body->n_node; i++)
         for (size_t c = 0; c < 3; c++) {
             const size_t at = (size_t)slot[i] + c * n;
-            mg->d[at] = mg->inverse[slot[i]] > 0 ? (float)((7 * i + 3 * (int)c) % 11 - 5) : 0;
+            mg->levels->d[at] = mg->inverse[slot[i]] > 0 ? (float)((7 * i + 3 * (int)c) % 11 - 5) : 0;
         }
-    double lambda = 1, size = size_of(mg, mg->d);
+    double lambda = 1, size = size_of(mg, mg->levels->d);
     for (int k = 0; k < PAL_POWER_ITERATIONS && size > 0 && isfinite(size); k++) {
-        for (int g = 0; g < mg->n_group; g++)
-            for (size_t i = (size_t)mg->group[g]; i < 3 * n; i += n)
-                store(mg->q + i, load(mg->weight + mg->group[g]) * load(mg->d + i));
-        multiply(mg, mg->d);
-        for (int g = 0; g < mg->n_group; g++)
-            for (size_t i = (size_t)mg->group[g]; i < 3 * n; i += n)
-                store(mg->d + i, load(mg->q + i) * load(mg->inverse + mg->group[g]) * (float)(1 / size));
-        lambda = size = size_of(mg, mg->d);
+        for (int g = 0; g < mg->levels->n_group; g++)
+            for (size_t i = (size_t)mg->levels->group[g]; i < 3 * n; i += n)
+                store(mg->levels->q + i, load(mg->weight + mg->levels->group[g]) * load(mg->levels->d + i));
+        multiply(mg, mg->levels->d);
+        for (int g = 0; g < mg->levels->n_group; g++)
+            for (size_t i = (size_t)mg->levels->group[g]; i < 3 * n; i += n)
+                store(mg->levels->d + i,
+                      load(mg->levels->q + i) * load(mg->inverse + mg->levels->group[g]) * (float)(1 / size));
+        lambda = size = size_of(mg, mg->levels->d);
     }
     mg->lambda = (float)(PAL_CHEBYSHEV_SAFE * lambda);
 }
 
 void pal_hex_multigrid_rotate(pal_hex_multigrid *mg)
 {
-    pal_hex_single_rotate(&mg->single);
+    pal_hex_single_rotate(&mg->levels->single);
 }
 
 pal_err pal_hex_multigrid_update(pal_hex_multigrid *mg, double mass, double stiff)
 {
     pal_spare_thread_wait(&mg->spare_thread);
-    pal_hex_single_stiffen(&mg->single, stiff);
-    pal_hex_single_rotate(&mg->single);
+    mg->stiff = (float)stiff;
+    pal_hex_single_stiffen(&mg->levels->single);
+    pal_hex_single_rotate(&mg->levels->single);
     fill_diagonal(mg, mass);
     find_lambda(mg);
-    return fill_levels(mg, mg->single.rotation, mg->coarse);
+    return fill_levels(mg, mg->levels->single.rotation, mg->coarse);
 }
 
 static void make_next(void *self)
 {
     pal_hex_multigrid *mg = self;
-    mg->outcome = mg->next ? PAL_ERR_OK : pal_multigrid_create(mg->grid, &mg->next);
+    mg->outcome = mg->next ? PAL_ERR_OK : pal_multigrid_create(&mg->levels->grid, &mg->next);
     if (!mg->outcome) mg->outcome = fill_levels(mg, mg->turned, mg->next);
 }
 
 pal_err pal_hex_multigrid_refresh(pal_hex_multigrid *mg)
 {
-    const pal_elastic_hexes *cubes = mg->cubes;
+    const pal_elastic_hexes *cubes = mg->levels->cubes;
     for (int i = 0; i < 9 * PAL_LANES * cubes->n_block && mg->turned; i++) mg->turned[i] = (float)cubes->rotation[i];
     return pal_spare_thread_run(&mg->spare_thread, make_next, mg);
 }
@@ -387,5 +399,5 @@ pal_err pal_hex_multigrid_adopt(pal_hex_multigrid *mg)
 double pal_hex_multigrid_flops(const pal_hex_multigrid *mg)
 {
     /* an element's 36 blocks turned and interpolated; the coarser levels add a third */
-    return 1e4 * mg->cubes->n_hex;
+    return 1e4 * mg->levels->cubes->n_hex;
 }

@@ -11,28 +11,32 @@
 #include "server/sim/elements/elastic_hex_single.h"
 #include "server/sim/implicit/warp.h"
 
-typedef struct pal_hex_multigrid {
+/* what all preconditioners of a body have in common, of which one solves at a time */
+typedef struct pal_hex_levels {
     const pal_body *body;
     const pal_elastic_hexes *cubes;
+    pal_grid_hierarchy grid; /* n_level 0: the body is too small */
     pal_elastic_hexes_single single;
-    const pal_grid_hierarchy *grid;
-    pal_multigrid *coarse, *next; /* in use; in the making on the spare thread, NULL before the first refresh */
-    pal_spare_thread spare_thread;
-    pal_err outcome;          /* of the spare thread */
-    float *turned;            /* rotations at the refresh, as in `single`; NULL: the law is linear */
-    float lambda;             /* no eigenvalue of D^-1 A is larger */
-    double mass, stiff;       /* of the last update */
     int n_group, n_slot;      /* groups of 8 slots with nodes */
     int32_t *group;           /* first slot [n_group] */
-    float *weight, *inverse;  /* mass M; 1 / D, 0 at fixed nodes and empty slots [n_slot] */
     float *x, *b, *d, *r, *q; /* answer, right side, direction, residual, product [3][n_slot] */
     float *part;              /* of residuals at nodes, x y z 0 [n_node][4] */
+} pal_hex_levels;
+
+typedef struct pal_hex_multigrid {
+    pal_hex_levels *levels;
+    pal_multigrid *coarse, *next; /* in use; in the making on the spare thread, NULL before the first refresh */
+    pal_spare_thread spare_thread;
+    pal_err outcome;         /* of the spare thread */
+    float *turned;           /* rotations at the refresh, as in `single`; NULL: the law is linear */
+    float lambda, stiff;     /* no eigenvalue of D^-1 A is larger; factor of K in A */
+    float *weight, *inverse; /* mass M; 1 / D, 0 at fixed nodes and empty slots [n_slot] */
 } pal_hex_multigrid;
 
-/* levels of the body, shared by all its preconditioners; n_level 0: it is too small. MEMORY. [load] */
-pal_err pal_hex_grid_make(const pal_body *body, pal_arena *arena, pal_grid_hierarchy *out);
-pal_err pal_hex_multigrid_make(const pal_body *body, const pal_elastic_hexes *cubes, const pal_grid_hierarchy *grid,
-                               pal_arena *arena, pal_hex_multigrid *out);
+/* MEMORY. [load] */
+pal_err pal_hex_levels_make(const pal_body *body, const pal_elastic_hexes *cubes, pal_arena *arena,
+                            pal_hex_levels *out);
+pal_err pal_hex_multigrid_make(pal_hex_levels *levels, pal_arena *arena, pal_hex_multigrid *out);
 void pal_hex_multigrid_destroy(pal_hex_multigrid *mg);
 /* takes material and rotations of the last linearise. NUMERIC: not positive definite; MEMORY */
 pal_err pal_hex_multigrid_update(pal_hex_multigrid *mg, double mass, double stiff);

@@ -59,10 +59,10 @@ static pal_err analyse(pal_preconditioner *p, const pal_preconditioner *like, pa
     return err;
 }
 
-static pal_err make_grid(pal_preconditioner *p, pal_arena *arena)
+static pal_err make_levels(pal_preconditioner *p, const pal_elastic_hexes *cubes, pal_arena *arena)
 {
-    p->grid = PAL_NEW(arena, pal_grid_hierarchy, 1);
-    return p->grid ? pal_hex_grid_make(p->system->body, arena, p->grid) : PAL_ERR_MEMORY;
+    p->levels = PAL_NEW(arena, pal_hex_levels, 1);
+    return p->levels ? pal_hex_levels_make(p->system->body, cubes, arena, p->levels) : PAL_ERR_MEMORY;
 }
 
 static pal_err choose(pal_preconditioner *p, const pal_elastic_hexes *cubes, pal_arena *arena)
@@ -87,8 +87,8 @@ static pal_err choose(pal_preconditioner *p, const pal_elastic_hexes *cubes, pal
     } else {
         snprintf(p->reason, sizeof p->reason, "its %d nodes are too many for a factor", body->n_node);
     }
-    PAL_TRY(make_grid(p, arena));
-    if (p->grid->n_level > 0) p->kind = PAL_PRECONDITION_MULTIGRID;
+    PAL_TRY(make_levels(p, cubes, arena));
+    if (p->levels->grid.n_level > 0) p->kind = PAL_PRECONDITION_MULTIGRID;
     return PAL_ERR_OK;
 }
 
@@ -102,14 +102,14 @@ static pal_err make_multigrid(pal_preconditioner *p, const pal_elastic_hexes *cu
             "body \"%s\": a multigrid preconditioner is for voxel hexahedra of linear or corotational law; "
             "take \"factor\"",
             body->name);
-    if (like) p->grid = like->grid;
-    if (!p->grid) PAL_TRY(make_grid(p, arena));
-    if (p->grid->n_level == 0)
+    if (like) p->levels = like->levels, p->shares = true;
+    if (!p->levels) PAL_TRY(make_levels(p, cubes, arena));
+    if (p->levels->grid.n_level == 0)
         return PAL_REFUSE(diag,
                           "body \"%s\": a multigrid preconditioner needs more than the body's %d nodes; take "
                           "\"factor\"",
                           body->name, body->n_node);
-    return pal_hex_multigrid_make(body, cubes, p->grid, arena, &p->multigrid);
+    return pal_hex_multigrid_make(p->levels, arena, &p->multigrid);
 }
 
 pal_err pal_preconditioner_make(const pal_preconditioner_options *options, pal_system *system,
@@ -195,7 +195,7 @@ void pal_preconditioner_rotate(pal_preconditioner *p)
 {
     if (p->kind == PAL_PRECONDITION_INCOMPLETE) return;
     pal_warp_rotate(&p->warp, p->rotations);
-    if (p->kind == PAL_PRECONDITION_MULTIGRID) pal_hex_multigrid_rotate(&p->multigrid);
+    if (p->kind == PAL_PRECONDITION_MULTIGRID && !p->shares) pal_hex_multigrid_rotate(&p->multigrid);
 }
 
 bool pal_preconditioner_refresh(pal_preconditioner *p, bool at_rest)

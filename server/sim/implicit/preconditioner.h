@@ -35,7 +35,8 @@ typedef struct pal_preconditioner {
     pal_block_matrix blocks;
     pal_cholesky *factor;
     pal_incomplete_cholesky incomplete;
-    pal_grid_hierarchy *grid; /* levels, also for further preconditioners of the same body; NULL: none */
+    pal_hex_levels *levels; /* also for further preconditioners of the same body; NULL: none */
+    bool shares;            /* the levels are of the one that it is `like`, which sees to their rotations */
     pal_hex_multigrid multigrid;
     double *inverse; /* jacobi [n_dof][9] */
     double *work;    /* [n_dof][3] */
