@@ -20,6 +20,7 @@ static const struct {
      bench_calibrate},
     {"guards", "", "cost of the guards while nothing goes wrong, as a share of a step", bench_guards},
     {"protocol", "", "encoding and decoding of frames", bench_protocol},
+    {"sessions", "", "sessions on one core, touched and asleep: steps, slowdown, memory", bench_sessions},
     {"sleep", "", "bodies at rest: awake, not observed, asleep", bench_sleep},
     {"estimate", "", "predicted cost and error of other configurations against measured ones", bench_estimate},
     {"latency", "", "from a pose put into a session to the frame that shows it", bench_latency},
