@@ -77,7 +77,7 @@ typedef struct pal_tangent {
      * (by volume, a preconditioner turned with soft material would stretch stiff material next to it). NULL: no
      * rotations
      */
-    void (*rotate)(void *self, double *rotation);
+    void (*rotate)(void *self, const pal_body *body, double *rotation);
     /* CONTACT, after a stage that moved the nodes by `moved` [n_node][3], m, since the loads were given (fixed and
      * prescribed nodes too). last: the stage ends the sub-step, and the forces on the tools become those it was solved
      * with; before that, only the caps are enforced. True: contact pulled where it can only push, or exceeded a cap, so
@@ -94,10 +94,10 @@ typedef struct pal_tangent {
 typedef struct pal_solve_report {
     int n_newton, n_cg; /* iterations of the last step, summed over its sub-steps and repeated solves */
     /* of the last solve of the last sub-step */
-    double residual;  /* relative to the loads */
-    double step_size; /* of the line search, 1: full */
-    bool converged;   /* the tolerance was met */
-    const char *preconditioner; /* of an implicit solver: jacobi, factor, multigrid, incomplete; NULL: none */
+    double residual;                   /* relative to the loads */
+    double step_size;                  /* of the line search, 1: full */
+    bool converged;                    /* the tolerance was met */
+    const char *preconditioner;        /* of an implicit solver: jacobi, factor, multigrid, incomplete; NULL: none */
     const char *preconditioner_reason; /* why it was chosen, with numbers; "": it was asked for */
     int64_t factor_nonzeros;
     int n_factor; /* factorisations since load */

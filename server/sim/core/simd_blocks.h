@@ -9,6 +9,7 @@
 #ifndef PAL_SIM_CORE_SIMD_BLOCKS_H
 #define PAL_SIM_CORE_SIMD_BLOCKS_H
 #include "server/base/arena.h"
+#include "server/base/team.h"
 #include "server/mesh/geometry/tets.h"
 
 #define PAL_INLINE static inline __attribute__((always_inline))
@@ -18,9 +19,10 @@ enum { PAL_LANES = 8, PAL_CORNERS = 4, PAL_SIMD_CORNERS_MAX = 8 };
 /* slots of a body's nodes, and working arrays that its components use in turn */
 typedef struct pal_node_order {
     int n_node, n_slot;
-    int32_t *slot; /* of each node                                        [n_node]    */
-    double *x;     /* positions by slot, 0 in empty ones; x, y, z          [3][n_slot] */
-    double *f;     /* forces by slot, zero between runs                    [3][n_slot] */
+    int32_t *slot;  /* of each node                                        [n_node]    */
+    double *x;      /* positions by slot, 0 in empty ones; x, y, z          [3][n_slot] */
+    double *f;      /* forces by slot, zero between runs                    [3][n_slot] */
+    pal_team *team; /* threads that share passes over nodes and blocks; NULL: the caller's alone */
 } pal_node_order;
 
 /* the blocks of one component */
@@ -54,6 +56,9 @@ pal_err pal_simd_blocks_make_ordered(const pal_node_order *node_order, const int
 /* item [n_item][n_corner] as in pal_simd_blocks_make_ordered, x_rest [n_node][3]; MEMORY */
 pal_err pal_block_rounds_make(const pal_simd_blocks *blocks, const double *x_rest, int n_node, double edge_m,
                               const int32_t *item, int n_item, pal_arena *arena, pal_block_rounds *out);
+/* calls piece(user, part) for every part, round by round; team may be NULL */
+void pal_block_rounds_run(const pal_block_rounds *rounds, pal_team *team, void (*piece)(void *user, int part),
+                          void *user);
 /* node_order->x = positions x [n_node][3] */
 void pal_node_order_load(pal_node_order *node_order, const double *x);
 /* force [n_node][3] += node_order->f, which is zero afterwards */

@@ -102,8 +102,9 @@ static void multiply(void *self, const pal_body *body, double k, const double *p
     pal_recovery_multiply(cells->recovery, k, p, out);
 }
 
-static void rotate(void *self, double *rotation)
+static void rotate(void *self, const pal_body *body, double *rotation)
 {
+    (void)body;
     const pal_cells_elastic *cells = self;
     pal_cells_elastic_rotate(cells, rotation);
     pal_recovery_rotate(cells->recovery, rotation);

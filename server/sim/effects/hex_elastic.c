@@ -111,9 +111,12 @@ static void linearise(void *self, const pal_body *body)
 
 static void multiply(void *self, const pal_body *body, double k, const double *p, double *out)
 {
-    const pal_elastic_hexes *hexes = self;
+    pal_elastic_hexes *hexes = self;
     pal_node_order_load(body->node_order, p);
-    (hexes->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_multiply : pal_hex_corot_multiply)(hexes, body->node_order, k);
+    if (hexes->law == PAL_LAW_NEO_HOOKEAN)
+        pal_hex_neo_multiply(hexes, body->node_order, k);
+    else
+        pal_hex_corot_multiply(hexes, body->node_order, k);
     pal_node_order_add(body->node_order, out);
     pal_recovery_multiply(hexes->recovery, k, p, out);
 }
@@ -125,10 +128,10 @@ static void assemble(void *self, double k, pal_block_matrix *to)
     pal_recovery_assemble(hexes->recovery, k, to);
 }
 
-static void rotate(void *self, double *rotation)
+static void rotate(void *self, const pal_body *body, double *rotation)
 {
     const pal_elastic_hexes *hexes = self;
-    pal_hex_rotate(hexes, rotation);
+    pal_hex_rotate(hexes, body->team, rotation);
     pal_recovery_rotate(hexes->recovery, rotation);
 }
 

@@ -145,8 +145,9 @@ static void assemble(void *self, double k, pal_block_matrix *to)
     pal_recovery_assemble(tets->whole.recovery, k, to);
 }
 
-static void rotate(void *self, double *rotation)
+static void rotate(void *self, const pal_body *body, double *rotation)
 {
+    (void)body;
     pal_elastic_tets_rotate(self, rotation);
     pal_recovery_rotate(((tet_elastic *)self)->whole.recovery, rotation);
 }

@@ -75,6 +75,10 @@ pal_err pal_hex_make(const pal_hex_options *options, pal_build *build, const cha
     PAL_TRY(pal_simd_blocks_make_ordered(body->node_order, out->hexes->node, out->n_hex, 8, build->arena,
                                          &out->simd_blocks));
     out->n_block = out->simd_blocks.n_lane / PAL_LANES;
+    PAL_TRY(pal_block_rounds_make(&out->simd_blocks, body->x_rest, body->n_node, out->edge_m, out->hexes->node,
+                                  out->n_hex, build->arena, &out->rounds));
+    out->part_energy_J = PAL_NEW(build->arena, double, out->rounds.part[out->rounds.n_round]);
+    if (!out->part_energy_J) return PAL_ERR_MEMORY;
     PAL_TRY(pal_elastic_regions_make(build, out->hexes->node, out->n_hex, 8, 8, &out->parts));
     PAL_TRY(take_memory(out, build->arena));
     if (out->implicit) PAL_TRY(pal_force_cache_make(body->n_node, build->arena, &out->force_cache));
@@ -133,16 +137,31 @@ void pal_hex_assemble(pal_elastic_hexes *cubes, double k, pal_block_matrix *to)
     }
 }
 
-void pal_hex_rotate(const pal_elastic_hexes *cubes, double *rotation)
+typedef struct rotation_sum {
+    const pal_elastic_hexes *cubes;
+    double *sum;
+} rotation_sum;
+
+static void rotate_part(void *user, int part)
 {
-    for (int e = 0; e < cubes->n_hex; e++) {
-        int lane = cubes->simd_blocks.place[e];
-        const double *at = cubes->rotation + 9 * (lane / PAL_LANES) * PAL_LANES + lane % PAL_LANES;
-        double r[9];
-        for (int i = 0; i < 9; i++) r[i] = cubes->mu[lane] * at[i * PAL_LANES];
-        for (int c = 0; c < 8; c++) {
-            double *to = rotation + 9 * cubes->hexes->node[8 * e + c];
-            for (int i = 0; i < 9; i++) to[i] += r[i];
+    const rotation_sum *to = user;
+    const pal_elastic_hexes *cubes = to->cubes;
+    for (int k = cubes->rounds.first[part]; k < cubes->rounds.first[part + 1]; k++) {
+        const int b = cubes->rounds.order[k];
+        for (int l = 0; l < PAL_LANES; l++) {
+            const int lane = PAL_LANES * b + l, e = cubes->hex[lane];
+            double r[9];
+            for (int i = 0; i < 9; i++) r[i] = cubes->mu[lane] * cubes->rotation[(9 * b + i) * PAL_LANES + l];
+            for (int c = 0; c < 8 && e >= 0; c++) {
+                double *at = to->sum + 9 * cubes->hexes->node[8 * e + c];
+                for (int i = 0; i < 9; i++) at[i] += r[i];
+            }
         }
     }
+}
+
+void pal_hex_rotate(const pal_elastic_hexes *cubes, pal_team *team, double *rotation)
+{
+    rotation_sum to = {.cubes = cubes, .sum = rotation};
+    pal_block_rounds_run(&cubes->rounds, team, rotate_part, &to);
 }

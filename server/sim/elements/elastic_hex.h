@@ -27,6 +27,8 @@ typedef struct pal_elastic_hexes {
     double edge_m;
     double beta[2]; /* beta = beta[0] mu + beta[1] lambda (elastic_hex_simd.h) */
     pal_simd_blocks simd_blocks;
+    pal_block_rounds rounds;
+    double *part_energy_J; /* of a pass over the blocks [number of parts] */
     pal_elastic_regions parts;
     double (*reference)[2][9]; /* 3x3 blocks of K for mu = 1 and for lambda = 1, corner pairs c <= d, h / 16 [36] */
 
@@ -65,9 +67,9 @@ static inline int pal_hex_pair(int c, int d)
     return c * (17 - c) / 2 + d - c;
 }
 
-/* effect.h assemble, rotate, measure, stress */
+/* effect.h assemble, rotate, measure, stress; team: NULL, or threads that share the work */
 void pal_hex_assemble(pal_elastic_hexes *cubes, double k, pal_block_matrix *to);
-void pal_hex_rotate(const pal_elastic_hexes *cubes, double *rotation);
+void pal_hex_rotate(const pal_elastic_hexes *cubes, pal_team *team, double *rotation);
 void pal_hex_measure(pal_elastic_hexes *cubes, const pal_body *body, pal_field field, double *sum, double *volume_m3);
 void pal_hex_stress(pal_elastic_hexes *cubes, const pal_body *body, pal_stress_take *take, void *user);
 
@@ -76,7 +78,7 @@ double pal_hex_corot_run(pal_elastic_hexes *cubes, pal_node_order *node_order, p
 /* cubes->reference: K for mu = 1 and for lambda = 1 */
 void pal_hex_fill_reference(pal_elastic_hexes *cubes);
 void pal_hex_corot_linearise(pal_elastic_hexes *cubes, pal_node_order *node_order);
-void pal_hex_corot_multiply(const pal_elastic_hexes *cubes, pal_node_order *node_order, double k);
+void pal_hex_corot_multiply(pal_elastic_hexes *cubes, pal_node_order *node_order, double k);
 /* the tangent's blocks of 8 elements, k K: to [36][9][8] */
 void pal_hex_corot_blocks(const pal_elastic_hexes *cubes, int block, double k, double *to);
 

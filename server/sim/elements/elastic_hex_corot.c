@@ -37,63 +37,95 @@ PAL_INLINE void rotation_force(pal_wide x[3][8], pal_wide g[3][8])
     g[1][1] += w[2], g[0][2] -= w[2];
 }
 
-/* forces are added, the energy is returned */
-PAL_INLINE double all_blocks(pal_elastic_hexes *cubes, pal_node_order *node_order, bool turned, pal_element_run what)
+/* what is done with the blocks */
+typedef struct pass {
+    pal_elastic_hexes *cubes;
+    pal_node_order *node_order;
+    pal_element_run what;
+    double k;
+} pass;
+
+/* of one block: forces are added, twice the energy of each lane is returned, with the sign of forces */
+PAL_INLINE pal_wide run_block(const pass *p, int b, bool turned, pal_element_run what)
 {
+    pal_elastic_hexes *cubes = p->cubes;
     pal_wide sum = {0};
-    for (int b = 0; b < cubes->n_block; b++) {
-        pal_block_view v;
-        pal_block_open(&cubes->simd_blocks, node_order, b, 8, &v);
-        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
-            pal_wide u[3][8], x[3][8], r[9], stiff[3], e = {0};
-            hex_modes(&v, l, u);
-            if (turned) {
-                hex_turn_block(cubes, b, l, u, r);
-                pal_wide_rotate(r, true, 1, 8, 8, u[0], u[0]);
-            }
-            memcpy(x, u, sizeof x);
-            for (int i = 0; i < 3; i++) u[i][1 << i] -= 4 * cubes->edge_m;
-            load_stiff(cubes, b, l, -1, stiff);
-            hex_stress(stiff[0], stiff[1], stiff[2], u);
-            for (int i = 0; i < 3 && (what & PAL_RUN_ENERGY); i++) {
-                for (int m = 1; m < 8; m++)
-                    e += m == 1 << i ? (x[i][m] - 4 * cubes->edge_m) * u[i][m] : x[i][m] * u[i][m];
-            }
-            /* lanes without an element may read numbers that are not finite */
-            if (what & PAL_RUN_ENERGY) sum += pal_wide_select(stiff[0] < 0, e, pal_wide_of(0));
-            if (!(what & PAL_RUN_FORCE)) continue;
-            if (turned) {
-                rotation_force(x, u);
-                pal_wide_rotate(r, false, 1, 8, 8, u[0], u[0]);
-            }
-            hex_add(&v, l, u);
+    pal_block_view v;
+    pal_block_open(&cubes->simd_blocks, p->node_order, b, 8, &v);
+    for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
+        pal_wide u[3][8], x[3][8], r[9], stiff[3], e = {0};
+        hex_modes(&v, l, u);
+        if (turned) {
+            hex_turn_block(cubes, b, l, u, r);
+            pal_wide_rotate(r, true, 1, 8, 8, u[0], u[0]);
         }
-        if (what & PAL_RUN_FORCE) pal_block_close(&cubes->simd_blocks, node_order, b, 8, &v);
+        memcpy(x, u, sizeof x);
+        for (int i = 0; i < 3; i++) u[i][1 << i] -= 4 * cubes->edge_m;
+        load_stiff(cubes, b, l, -1, stiff);
+        hex_stress(stiff[0], stiff[1], stiff[2], u);
+        for (int i = 0; i < 3 && (what & PAL_RUN_ENERGY); i++) {
+            for (int m = 1; m < 8; m++) e += m == 1 << i ? (x[i][m] - 4 * cubes->edge_m) * u[i][m] : x[i][m] * u[i][m];
+        }
+        /* lanes without an element may read numbers that are not finite */
+        if (what & PAL_RUN_ENERGY) sum += pal_wide_select(stiff[0] < 0, e, pal_wide_of(0));
+        if (!(what & PAL_RUN_FORCE)) continue;
+        if (turned) {
+            rotation_force(x, u);
+            pal_wide_rotate(r, false, 1, 8, 8, u[0], u[0]);
+        }
+        hex_add(&v, l, u);
     }
+    if (what & PAL_RUN_FORCE) pal_block_close(&cubes->simd_blocks, p->node_order, b, 8, &v);
+    return sum;
+}
+
+PAL_INLINE void run_blocks(const pass *p, int part, bool turned, pal_element_run what)
+{
+    const pal_block_rounds *rounds = &p->cubes->rounds;
+    pal_wide sum = {0};
     double all = 0;
+    for (int i = rounds->first[part]; i < rounds->first[part + 1]; i++)
+        sum += run_block(p, rounds->order[i], turned, what);
     for (int l = 0; l < PAL_WIDE; l++) all += sum[l];
-    return -0.5 * all;
+    p->cubes->part_energy_J[part] = -0.5 * all;
+}
+
+PAL_INLINE void run_law(const pass *p, int part, bool turned)
+{
+    if (p->what == PAL_RUN_FORCE)
+        run_blocks(p, part, turned, PAL_RUN_FORCE);
+    else if (p->what == PAL_RUN_ENERGY)
+        run_blocks(p, part, turned, PAL_RUN_ENERGY);
+    else
+        run_blocks(p, part, turned, PAL_RUN_BOTH);
+}
+
+static void run_part(void *user, int part)
+{
+    const pass *p = user;
+    if (p->cubes->law != PAL_LAW_LINEAR)
+        run_law(p, part, true);
+    else
+        run_law(p, part, false);
 }
 
 double pal_hex_corot_run(pal_elastic_hexes *cubes, pal_node_order *node_order, pal_element_run what)
 {
-    const bool turned = cubes->law != PAL_LAW_LINEAR;
-    if (what == PAL_RUN_FORCE)
-        return turned ? all_blocks(cubes, node_order, true, PAL_RUN_FORCE)
-                      : all_blocks(cubes, node_order, false, PAL_RUN_FORCE);
-    if (what == PAL_RUN_ENERGY)
-        return turned ? all_blocks(cubes, node_order, true, PAL_RUN_ENERGY)
-                      : all_blocks(cubes, node_order, false, PAL_RUN_ENERGY);
-    return turned ? all_blocks(cubes, node_order, true, PAL_RUN_BOTH)
-                  : all_blocks(cubes, node_order, false, PAL_RUN_BOTH);
+    pass p = {.cubes = cubes, .node_order = node_order, .what = what};
+    double sum_J = 0;
+    pal_block_rounds_run(&cubes->rounds, node_order->team, run_part, &p);
+    for (int k = 0; k < cubes->rounds.part[cubes->rounds.n_round]; k++) sum_J += cubes->part_energy_J[k];
+    return sum_J;
 }
 
-void pal_hex_corot_linearise(pal_elastic_hexes *cubes, pal_node_order *node_order)
+static void linearise_part(void *user, int part)
 {
-    if (cubes->law == PAL_LAW_LINEAR) return;
-    for (int b = 0; b < cubes->n_block; b++) {
+    const pass *p = user;
+    pal_elastic_hexes *cubes = p->cubes;
+    for (int i = cubes->rounds.first[part]; i < cubes->rounds.first[part + 1]; i++) {
+        const int b = cubes->rounds.order[i];
         pal_block_view v;
-        pal_block_open(&cubes->simd_blocks, node_order, b, 8, &v);
+        pal_block_open(&cubes->simd_blocks, p->node_order, b, 8, &v);
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             pal_wide u[3][8], r[9];
             hex_modes(&v, l, u);
@@ -103,31 +135,46 @@ void pal_hex_corot_linearise(pal_elastic_hexes *cubes, pal_node_order *node_orde
     }
 }
 
-PAL_INLINE void multiply_all(const pal_elastic_hexes *cubes, pal_node_order *node_order, double k, bool turned)
+void pal_hex_corot_linearise(pal_elastic_hexes *cubes, pal_node_order *node_order)
 {
-    for (int b = 0; b < cubes->n_block; b++) {
+    pass p = {.cubes = cubes, .node_order = node_order};
+    if (cubes->law != PAL_LAW_LINEAR) pal_block_rounds_run(&cubes->rounds, node_order->team, linearise_part, &p);
+}
+
+PAL_INLINE void multiply_blocks(const pass *p, int part, bool turned)
+{
+    const pal_elastic_hexes *cubes = p->cubes;
+    for (int i = cubes->rounds.first[part]; i < cubes->rounds.first[part + 1]; i++) {
+        const int b = cubes->rounds.order[i];
         pal_block_view v;
-        pal_block_open(&cubes->simd_blocks, node_order, b, 8, &v);
+        pal_block_open(&cubes->simd_blocks, p->node_order, b, 8, &v);
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             pal_wide u[3][8], r[9], stiff[3];
             hex_modes(&v, l, u);
             if (turned) pal_wide_load_n(cubes->rotation + 9 * b * PAL_LANES + l, 9, r);
             if (turned) pal_wide_rotate(r, true, 1, 8, 8, u[0], u[0]);
-            load_stiff(cubes, b, l, k, stiff);
+            load_stiff(cubes, b, l, p->k, stiff);
             hex_stress(stiff[0], stiff[1], stiff[2], u);
             if (turned) pal_wide_rotate(r, false, 1, 8, 8, u[0], u[0]);
             hex_add(&v, l, u);
         }
-        pal_block_close(&cubes->simd_blocks, node_order, b, 8, &v);
+        pal_block_close(&cubes->simd_blocks, p->node_order, b, 8, &v);
     }
 }
 
-void pal_hex_corot_multiply(const pal_elastic_hexes *cubes, pal_node_order *node_order, double k)
+static void multiply_part(void *user, int part)
 {
-    if (cubes->law == PAL_LAW_LINEAR)
-        multiply_all(cubes, node_order, k, false);
+    const pass *p = user;
+    if (p->cubes->law == PAL_LAW_LINEAR)
+        multiply_blocks(p, part, false);
     else
-        multiply_all(cubes, node_order, k, true);
+        multiply_blocks(p, part, true);
+}
+
+void pal_hex_corot_multiply(pal_elastic_hexes *cubes, pal_node_order *node_order, double k)
+{
+    pass p = {.cubes = cubes, .node_order = node_order, .k = k};
+    pal_block_rounds_run(&cubes->rounds, node_order->team, multiply_part, &p);
 }
 
 void pal_hex_corot_blocks(const pal_elastic_hexes *cubes, int block, double k, double *to)

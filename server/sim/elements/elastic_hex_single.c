@@ -16,8 +16,6 @@ pal_err pal_hex_single_make(const pal_elastic_hexes *cubes, const pal_body *body
 {
     const size_t n = PAL_LANES * (size_t)cubes->n_block;
     *out = (pal_elastic_hexes_single){.cubes = cubes, .n_slot = body->node_order->n_slot};
-    PAL_TRY(pal_block_rounds_make(&cubes->simd_blocks, body->x_rest, body->n_node, cubes->edge_m, cubes->hexes->node,
-                                  cubes->n_hex, arena, &out->rounds));
     out->stiff = PAL_NEW(arena, float, 2 * n);
     if (cubes->law != PAL_LAW_LINEAR) out->rotation = PAL_NEW(arena, float, 9 * n);
     return out->stiff && (out->rotation || cubes->law == PAL_LAW_LINEAR) ? PAL_ERR_OK : PAL_ERR_MEMORY;
@@ -83,7 +81,6 @@ typedef struct product {
     float k;
     const float *p;
     float *out;
-    int part; /* first of the round */
 } product;
 
 static void multiply_strip(const product *to, int b)
@@ -112,13 +109,12 @@ static void multiply_loose(const product *to, int b)
             for (int l = 0; l < PAL_LANES; l++) to->out[d * n_slot + (size_t)node[PAL_LANES * c + l]] += u[d][c][l];
 }
 
-static void multiply_part(void *user, int worker, int index)
+static void multiply_part(void *user, int part)
 {
     const product *to = user;
-    const pal_block_rounds *rounds = &to->single->rounds;
+    const pal_block_rounds *rounds = &to->single->cubes->rounds;
     const int n_strip = to->single->cubes->simd_blocks.n_strip;
-    (void)worker;
-    for (int k = rounds->first[to->part + index]; k < rounds->first[to->part + index + 1]; k++)
+    for (int k = rounds->first[part]; k < rounds->first[part + 1]; k++)
         if (rounds->order[k] < n_strip)
             multiply_strip(to, rounds->order[k]);
         else
@@ -128,11 +124,8 @@ static void multiply_part(void *user, int worker, int index)
 void pal_hex_single_multiply(const pal_elastic_hexes_single *single, pal_team *team, float k, const float *p,
                              float *out)
 {
-    const pal_block_rounds *rounds = &single->rounds;
-    for (int round = 0; round < rounds->n_round; round++) {
-        product job = {.single = single, .k = k, .p = p, .out = out, .part = rounds->part[round]};
-        pal_team_run(team, rounds->part[round + 1] - rounds->part[round], multiply_part, &job);
-    }
+    product job = {.single = single, .k = k, .p = p, .out = out};
+    pal_block_rounds_run(&single->cubes->rounds, team, multiply_part, &job);
 }
 
 /* to = R k R', one block of 3x3 */

@@ -9,7 +9,6 @@
 typedef struct pal_elastic_hexes_single {
     const pal_elastic_hexes *cubes;
     int n_slot;
-    pal_block_rounds rounds;
     float *stiff;    /* mu, lambda times h / 16, N/m                   [n_block][2][8] */
     float *rotation; /* [n_block][9][8]; NULL: the law is linear */
 } pal_elastic_hexes_single;

@@ -146,7 +146,7 @@ void pal_system_rotate(const pal_system *system, double *rotation)
     for (int i = 0; i < system->n_force; i++) {
         const pal_component *component = &system->force[i];
         if (component->effect->tangent && component->effect->tangent->rotate)
-            component->effect->tangent->rotate(component->self, to);
+            component->effect->tangent->rotate(component->self, body, to);
     }
     if (!system->interpolated_system) return;
     memset(rotation, 0, 9 * sizeof(double) * (size_t)body->n_dof);

@@ -199,7 +199,10 @@ static pal_err create(pal_world *w, const pal_scene *scene, pal_diagnostic *diag
     w->max_substep = scene->max_substep;
     if (scene->threads > 1) PAL_TRY(pal_team_create(scene->threads, &w->team));
     PAL_TRY(pal_plan_build(scene, w->arena, diag, &w->plan));
-    for (int b = 0; b < w->plan.n_body; b++) w->plan.body[b].team = w->team;
+    for (int b = 0; b < w->plan.n_body; b++) {
+        w->plan.body[b].team = w->team;
+        if (w->plan.body[b].node_order) w->plan.body[b].node_order->team = w->team;
+    }
     w->scratch = pal_arena_create(w->plan.scratch_byte + 64, false);
     if (!w->scratch) return PAL_ERR_MEMORY;
     w->tools.n_tool = scene->n_tool;

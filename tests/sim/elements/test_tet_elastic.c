@@ -212,7 +212,7 @@ static void corotational_tangent_is_the_turned_one(void)
         }
         /* rotations around nodes: all R */
         double *turn = calloc(9 * (size_t)b.n, sizeof *turn);
-        b.row.effect->tangent->rotate(b.row.self, turn);
+        b.row.effect->tangent->rotate(b.row.self, &b.body, turn);
         for (int i = 0; i < b.n; i++) {
             double length = 0;
             for (int k = 0; k < 9; k++) length += turn[9 * i + k] * turn[9 * i + k] / 3;

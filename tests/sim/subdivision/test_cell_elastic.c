@@ -129,7 +129,7 @@ static void force_without_the_turning_of_the_frame_would_not_be(void)
     double fixed[24] = {0}, u[24];
     cell_effect->tangent->linearise(b.row, &b.body);
     double turn[24 * 3] = {0};
-    cell_effect->tangent->rotate(b.row, turn);
+    cell_effect->tangent->rotate(b.row, &b.body, turn);
     /* R K (R'x - X) = R K R'(x - R X) */
     double r[9];
     memcpy(r, turn, sizeof r);
@@ -454,7 +454,7 @@ static void products_are_those_of_the_tangent_with_fixed_rotations(void)
         for (int k = 0; k < n; k++) apart = fmax(apart, fabs(-2 * f[k] / h - kp[k]));
         CHECK_LE(apart, 1e-3 * cell_largest(kp, n));
         /* rotations at nodes: of the body, weighing the stiffness of all elements together */
-        cell_effect->tangent->rotate(b.row, turn);
+        cell_effect->tangent->rotate(b.row, &b.body, turn);
         double sum[9] = {0}, all_N_m = 0;
         for (int e = 0; e < b.row->n_cell; e++) all_N_m += b.row->k_N_m[e];
         for (int k = 0; k < 3 * n; k++) sum[k % 9] += turn[k];
