@@ -15,15 +15,15 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* VERSION_IMAGE has image coordinates behind all else */
-enum { HEAD_BYTES = 40, VERSION = 1, VERSION_IMAGE = 2, LEVEL_MAX = 4096, HC_LEVEL = 9 };
+/* VERSION_LOOK has looks and image coordinates behind all else */
+enum { HEAD_BYTES = 40, VERSION = 1, VERSION_LOOK = 2, LEVEL_MAX = 4096, HC_LEVEL = 9 };
 #define ASSET_MAGIC 0x314D4C50u /* the bytes P L M 1 */
 
-/* bytes of the planes: rest 12, vertex_of 4, neighbours 16, weights 8, image coordinates 8 per vertex, 12 per triangle,
- * 4 per level */
+/* bytes of the planes: rest 12, vertex_of 4, neighbours 16, weights 8, image coordinates 8, look 1 per vertex, 12 per
+ * triangle, 4 per level */
 static size_t planes_bytes(uint32_t version, uint32_t n_vertex, uint32_t n_triangle, uint32_t n_level)
 {
-    return (version == VERSION_IMAGE ? 48 : 40) * (size_t)n_vertex + 12 * (size_t)n_triangle + 4 * (size_t)n_level;
+    return (version == VERSION_LOOK ? 49 : 40) * (size_t)n_vertex + 12 * (size_t)n_triangle + 4 * (size_t)n_level;
 }
 
 static uint32_t fnv1a(const uint8_t *bytes, size_t n)
@@ -53,8 +53,8 @@ static const uint8_t *read_floats(const uint8_t *at, float *to, size_t n, size_t
     return at + 4 * n;
 }
 
-static void write_planes(uint8_t *at, const float *rest_m, const float *uv, const pal_frame_order *o,
-                         const uint32_t *triangle, uint32_t n_triangle)
+static void write_planes(uint8_t *at, const float *rest_m, const uint8_t *look, const float *uv,
+                         const pal_frame_order *o, const uint32_t *triangle, uint32_t n_triangle)
 {
     size_t n = o->n_vertex;
     uint32_t before = 0;
@@ -80,13 +80,14 @@ static void write_planes(uint8_t *at, const float *rest_m, const float *uv, cons
     at += 4 * n_corner;
     for (size_t l = 0; l < o->n_level; l++) pal_put_plane(at, o->n_level, l, o->level_begin[l]);
     at += 4 * o->n_level;
-    for (size_t c = 0; c < 2 && uv; c++) at = write_floats(at, uv, n, 2, c);
+    for (size_t c = 0; c < 2 && look; c++) at = write_floats(at, uv, n, 2, c);
+    if (look) memcpy(at, look, n);
 }
 
-int pal_asset_encode(const float *rest_m, const float *uv, const pal_frame_order *order, const uint32_t *triangle,
-                     uint32_t n_triangle, uint8_t **bytes, size_t *n_byte)
+int pal_asset_encode(const float *rest_m, const uint8_t *look, const float *uv, const pal_frame_order *order,
+                     const uint32_t *triangle, uint32_t n_triangle, uint8_t **bytes, size_t *n_byte)
 {
-    const uint32_t version = uv ? VERSION_IMAGE : VERSION;
+    const uint32_t version = look ? VERSION_LOOK : VERSION;
     if (order->n_level > LEVEL_MAX || n_triangle > PAL_ORDER_TRIANGLE_MAX) return PAL_REFUSAL_COUNT;
     size_t n_raw = planes_bytes(version, order->n_vertex, n_triangle, order->n_level);
     if (n_raw > PAL_ASSET_BYTES_MAX) return PAL_REFUSAL_LONG;
@@ -94,7 +95,7 @@ int pal_asset_encode(const float *rest_m, const float *uv, const pal_frame_order
     uint8_t *raw = malloc(n_raw), *packed = malloc(HEAD_BYTES + bound);
     int refusal = raw && packed ? PAL_REFUSAL_NONE : PAL_REFUSAL_MEMORY;
     if (!refusal) {
-        write_planes(raw, rest_m, uv, order, triangle, n_triangle);
+        write_planes(raw, rest_m, look, uv, order, triangle, n_triangle);
         int n_lz4 = LZ4_compress_HC((const char *)raw, (char *)packed + HEAD_BYTES, (int)n_raw, (int)bound, HC_LEVEL);
         if (n_lz4 <= 0) refusal = PAL_REFUSAL_MEMORY;
         const uint32_t head[10] = {ASSET_MAGIC,
@@ -124,7 +125,7 @@ static int read_head(const uint8_t *bytes, size_t n_byte, uint32_t head[10])
     if (n_byte < HEAD_BYTES) return PAL_REFUSAL_SHORT;
     for (int i = 0; i < 10; i++) head[i] = pal_get_u32(bytes + 4 * i);
     if (head[0] != ASSET_MAGIC) return PAL_REFUSAL_MAGIC;
-    if (head[1] != VERSION && head[1] != VERSION_IMAGE) return PAL_REFUSAL_KIND;
+    if (head[1] != VERSION && head[1] != VERSION_LOOK) return PAL_REFUSAL_KIND;
     if (head[8] || head[9]) return PAL_REFUSAL_FLAGS;
     uint32_t n_vertex = head[2], n_triangle = head[3], n_level = head[4];
     if (n_vertex == 0 || n_vertex > PAL_ORDER_VERTEX_MAX || n_triangle > PAL_ORDER_TRIANGLE_MAX || n_level == 0 ||
@@ -148,10 +149,13 @@ static int allocate(const uint32_t head[10], pal_asset **out)
     a->order = pal_frame_order_allocate(head[2], head[4]);
     a->rest_m = malloc(3 * (size_t)head[2] * sizeof *a->rest_m);
     a->triangle = malloc((3 * (size_t)head[3] + 1) * sizeof *a->triangle);
-    if (head[1] == VERSION_IMAGE) a->uv = malloc(2 * (size_t)head[2] * sizeof *a->uv);
+    if (head[1] == VERSION_LOOK) {
+        a->uv = malloc(2 * (size_t)head[2] * sizeof *a->uv);
+        a->look = malloc(head[2]);
+    }
     *out = a;
-    return a->order && a->rest_m && a->triangle && (a->uv || head[1] == VERSION) ? PAL_REFUSAL_NONE
-                                                                                 : PAL_REFUSAL_MEMORY;
+    return a->order && a->rest_m && a->triangle && ((a->uv && a->look) || head[1] == VERSION) ? PAL_REFUSAL_NONE
+                                                                                              : PAL_REFUSAL_MEMORY;
 }
 
 static void read_planes(const uint8_t *at, pal_asset *a)
@@ -176,7 +180,8 @@ static void read_planes(const uint8_t *at, pal_asset *a)
     for (size_t l = 0; l < o->n_level; l++) o->level_begin[l] = pal_get_plane(at, o->n_level, l);
     o->level_begin[o->n_level] = o->n_vertex;
     at += 4 * o->n_level;
-    for (size_t c = 0; c < 2 && a->uv; c++) at = read_floats(at, a->uv, n, 2, c);
+    for (size_t c = 0; c < 2 && a->look; c++) at = read_floats(at, a->uv, n, 2, c);
+    if (a->look) memcpy(a->look, at, n);
 }
 
 /* everything a frame decoder or a renderer trusts */
@@ -222,6 +227,7 @@ void pal_asset_destroy(pal_asset *asset)
 {
     if (!asset) return;
     free(asset->rest_m);
+    free(asset->look);
     free(asset->uv);
     free(asset->triangle);
     pal_frame_order_destroy(asset->order);

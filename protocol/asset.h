@@ -15,15 +15,18 @@
 
 typedef struct pal_asset {
     uint32_t n_triangle;
-    float *rest_m;          /* shown vertices at rest m, finite   [order->n_vertex][3] */
-    float *uv;              /* image coordinates of the vertices, finite; NULL: none [order->n_vertex][2] */
+    float *rest_m; /* shown vertices at rest m, finite   [order->n_vertex][3] */
+    /* what the vertices look like, 0 the outside of tissue, 1 its inside, 2 + k image k of the part, and where they lie
+     * in their image, finite; NULL: all are outside */
+    uint8_t *look;          /* [order->n_vertex]                                       */
+    float *uv;              /* [order->n_vertex][2]                                    */
     uint32_t *triangle;     /* vertex indices                     [n_triangle][3]      */
     pal_frame_order *order; /* checked by pal_frame_order_check                        */
 } pal_asset;
 
-/* [load] encodes (all borrowed for the call; uv NULL: none); the caller frees *bytes with free() */
-int pal_asset_encode(const float *rest_m, const float *uv, const pal_frame_order *order, const uint32_t *triangle,
-                     uint32_t n_triangle, uint8_t **bytes, size_t *n_byte);
+/* [load] encodes (all borrowed for the call; look and uv NULL: none); the caller frees *bytes with free() */
+int pal_asset_encode(const float *rest_m, const uint8_t *look, const float *uv, const pal_frame_order *order,
+                     const uint32_t *triangle, uint32_t n_triangle, uint8_t **bytes, size_t *n_byte);
 /* [load] decodes untrusted bytes and validates everything a frame decoder or a renderer trusts; refuses from the header
  * alone when the stated counts cannot come from so few bytes. The caller frees *out with pal_asset_destroy. */
 int pal_asset_decode(const uint8_t *bytes, size_t n_byte, pal_asset **out);

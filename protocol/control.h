@@ -22,6 +22,7 @@
 #define PAL_WIRE_MEMBER_NAME   32
 #define PAL_WIRE_ORDER_MAX     16
 #define PAL_WIRE_ARG_MAX       16
+#define PAL_WIRE_IMAGE_MAX     8 /* images on a part */
 #define PAL_WIRE_FIELDS_MAX    8 /* fields that a part may offer */
 #define PAL_WIRE_FIELD_BYTES   24
 #define PAL_WIRE_LOOK_BYTES    16
@@ -74,10 +75,10 @@ typedef struct pal_wire_part_info {
     uint32_t epoch;
     uint32_t n_vertex, n_triangle;
     char asset[PAL_WIRE_NAME_BYTES]; /* path on the same server: "/asset/<hash>"   */
-    char image[PAL_WIRE_NAME_BYTES]; /* the same, of the image on its surface (PNG, JPEG), whose asset has uv; "": none,
-                                        and not on the wire */
-    double error_m;                  /* bound per axis of its frames in normal use */
-    uint32_t n_field;                /* fields for `subscribe_field`; 0 also from servers without fields */
+    uint32_t n_image;                /* images on its surface (PNG, JPEG), whose asset has looks; 0: not on the wire */
+    char image[PAL_WIRE_IMAGE_MAX][PAL_WIRE_NAME_BYTES]; /* paths as `asset` */
+    double error_m;                                      /* bound per axis of its frames in normal use */
+    uint32_t n_field; /* fields for `subscribe_field`; 0 also from servers without fields */
     char field[PAL_WIRE_FIELDS_MAX][PAL_WIRE_FIELD_BYTES]; /* "displacement", "von_mises" ...           */
     char interior[PAL_WIRE_NAME_BYTES]; /* path of the asset of its interior, as `asset`; "": it has none */
     bool is_sculptable; /* its control cells and material can be changed by commands; false is not on the wire */

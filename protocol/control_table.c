@@ -9,21 +9,22 @@
 #define ITEM(of, member)   sizeof(((pal_wire_##of *)0)->member[0])
 #define LENGTH(of, member) (sizeof(((pal_wire_##of *)0)->member) / ITEM(of, member))
 
-static const pal_control_field part_fields[] = {{"name", TEXT, true, ONE(part_info, name)},
-                                                {"epoch", U32, true, ONE(part_info, epoch)},
-                                                {"n_vertex", U32, true, ONE(part_info, n_vertex)},
-                                                {"n_triangle", U32, true, ONE(part_info, n_triangle)},
-                                                {"asset", TEXT, true, ONE(part_info, asset)},
-                                                {"image", TEXT_OR_EMPTY, false, ONE(part_info, image)},
-                                                {"error_m", F64, true, ONE(part_info, error_m)},
-                                                {"fields", TEXTS, false, LIST(part_info, field, n_field), NULL},
-                                                {"interior", TEXT_OR_EMPTY, false, ONE(part_info, interior)},
-                                                {"adaptive", BOOL, false, ONE(part_info, is_adaptive)},
-                                                {"sculptable", BOOL, false, ONE(part_info, is_sculptable)},
-                                                {"appearance", TEXT_OR_EMPTY, false, ONE(part_info, appearance)},
-                                                {"colour", TEXT_OR_EMPTY, false, ONE(part_info, colour)},
-                                                {"control_cells", TEXT_OR_EMPTY, false, ONE(part_info, control_cells)},
-                                                {0}};
+static const pal_control_field part_fields[] = {
+    {"name", TEXT, true, ONE(part_info, name)},
+    {"epoch", U32, true, ONE(part_info, epoch)},
+    {"n_vertex", U32, true, ONE(part_info, n_vertex)},
+    {"n_triangle", U32, true, ONE(part_info, n_triangle)},
+    {"asset", TEXT, true, ONE(part_info, asset)},
+    {"images", TEXTS_OR_EMPTY, false, LIST(part_info, image, n_image), NULL},
+    {"error_m", F64, true, ONE(part_info, error_m)},
+    {"fields", TEXTS, false, LIST(part_info, field, n_field), NULL},
+    {"interior", TEXT_OR_EMPTY, false, ONE(part_info, interior)},
+    {"adaptive", BOOL, false, ONE(part_info, is_adaptive)},
+    {"sculptable", BOOL, false, ONE(part_info, is_sculptable)},
+    {"appearance", TEXT_OR_EMPTY, false, ONE(part_info, appearance)},
+    {"colour", TEXT_OR_EMPTY, false, ONE(part_info, colour)},
+    {"control_cells", TEXT_OR_EMPTY, false, ONE(part_info, control_cells)},
+    {0}};
 static const pal_control_field tool_fields[] = {{"name", TEXT, true, ONE(tool_info, name)},
                                                 {"radius_m", F64, true, ONE(tool_info, radius_m)},
                                                 {"force_cap_N", F64, false, ONE(tool_info, force_cap_N)},

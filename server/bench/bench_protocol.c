@@ -183,7 +183,7 @@ static int prepare(bench *b)
     uint8_t *bytes = NULL;
     size_t n_byte = 0;
     if (!refusal)
-        refusal = pal_asset_encode(s->rest_m, NULL, b->asset.order, s->triangle, s->n_triangle, &bytes, &n_byte);
+        refusal = pal_asset_encode(s->rest_m, NULL, NULL, b->asset.order, s->triangle, s->n_triangle, &bytes, &n_byte);
     free(bytes);
     b->order_s = middle - begin;
     b->asset_s = thread_s() - middle;

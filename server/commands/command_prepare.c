@@ -503,7 +503,7 @@ static const pal_flag flag[] = {
     {"--label", "N", PAL_FLAG_COUNT, &args.scene.label, 1, INT32_MAX, "label of a segmented scan (the most frequent)"},
     {"--list-labels", NULL, PAL_FLAG_SWITCH, &args.list_labels, 0, 0, "only list the labels of a segmented scan"},
     {"--no-image", NULL, PAL_FLAG_SWITCH, &args.scene.no_image, 0, 0,
-     "leave the image of an OBJ file out (map_Kd of its first material: a PNG or JPEG beside the file)"},
+     "leave the images of an OBJ file out (map_Kd of its materials: PNGs or JPEGs beside the file)"},
     {"--units", "UNIT", PAL_FLAG_TEXT, &args.units, 0, 0,
      "unit of a surface file: m, cm, mm, um or in (guessed from the size)"},
     {"--triangles", "N", PAL_FLAG_COUNT, &args.scene.target_tri, 100, 10000000,

@@ -279,7 +279,8 @@ static pal_packet *find_asset(const pal_hub_room *room, const char *path)
         const pal_stream_part *part = &room->stream->part[p];
         if (!strcmp(part->info.asset, path)) return part->asset;
         if (!strcmp(part->info.interior, path)) return part->interior_asset;
-        if (part->image && !strcmp(part->info.image, path)) return part->image;
+        for (uint32_t k = 0; k < part->info.n_image; k++)
+            if (!strcmp(part->info.image[k], path)) return part->image[k];
         if (part->control_cells && !strcmp(part->info.control_cells, path)) return part->control_cells;
     }
     for (int i = 0; i < PAL_HUB_OLD_ASSETS; i++)

@@ -63,7 +63,7 @@ static int encode_interior(const pal_shown *shown, uint8_t **bytes, size_t *n_by
     }
     if (!refusal) {
         order->level_begin[0] = 0, order->level_begin[1] = n;
-        refusal = pal_asset_encode(rest_m, NULL, order, face, 2 * n_tet, bytes, n_byte);
+        refusal = pal_asset_encode(rest_m, NULL, NULL, order, face, 2 * n_tet, bytes, n_byte);
     }
     free(rest_m);
     free(face);
@@ -100,9 +100,13 @@ static pal_err open_control_cells(pal_stream *s, int index, const pal_shown *sho
     return err;
 }
 
-static pal_err name_image(pal_stream_part *part, const pal_image *image)
+static pal_err name_images(pal_stream_part *part, const pal_body_def *def)
 {
-    return make_file(image->bytes, image->n_byte, part->info.image, &part->image);
+    for (int k = 0; k < def->n_image; k++) {
+        PAL_TRY(make_file(def->image[k].bytes, def->image[k].n_byte, part->info.image[k], &part->image[k]));
+        part->info.n_image++;
+    }
+    return PAL_ERR_OK;
 }
 
 /* builds the asset and encoders of one part */
@@ -114,7 +118,6 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
     size_t n_byte = 0;
     pal_err err = PAL_ERR_OK;
     const uint32_t *tri = (const uint32_t *)shown->tri; /* indices are nonnegative */
-    const pal_image *image = shown->uv ? s->scene->body[index].image : NULL;
 
     int refusal =
         shown->parent
@@ -124,7 +127,7 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
             : pal_frame_order_create(shown->rest_m, (uint32_t)shown->n_vertex, tri, (uint32_t)shown->n_tri, &order);
     if (refusal) return refuse(diag, refusal, shown->name, "no vertex order");
     refusal =
-        pal_asset_encode(shown->rest_m, image ? shown->uv : NULL, order, tri, (uint32_t)shown->n_tri, &bytes, &n_byte);
+        pal_asset_encode(shown->rest_m, shown->look, shown->uv, order, tri, (uint32_t)shown->n_tri, &bytes, &n_byte);
     if (refusal) err = refuse(diag, refusal, shown->name, "no asset");
     for (int t = 0; !err && t < PAL_STREAM_TIER_COUNT; t++) {
         refusal = pal_frame_encoder_create(shown->rest_m, order, &s->encoder[index][t]);
@@ -133,7 +136,7 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
     if (!err) err = make_file(bytes, n_byte, part->info.asset, &part->asset);
     if (!err) err = open_control_cells(s, index, shown);
     if (!err) {
-        if (image) err = name_image(part, image);
+        if (shown->look) err = name_images(part, &s->scene->body[index]);
         pal_plain_text(part->info.name, sizeof part->info.name, shown->name);
         part->info.epoch = 1;
         part->info.n_vertex = (uint32_t)shown->n_vertex;
@@ -208,7 +211,7 @@ void pal_stream_close(pal_stream *stream)
     if (!stream) return;
     for (int p = 0; p < stream->n_part; p++) {
         pal_packet_drop(stream->part[p].asset);
-        pal_packet_drop(stream->part[p].image);
+        for (int k = 0; k < PAL_IMAGES_MAX; k++) pal_packet_drop(stream->part[p].image[k]);
         pal_packet_drop(stream->part[p].control_cells);
         pal_triangle_slots_free(stream->part[p].slots);
         drop_fields(&stream->part[p]);

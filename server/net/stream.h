@@ -29,7 +29,7 @@ typedef struct pal_stream_values {
 typedef struct pal_stream_part {
     pal_wire_part_info info;
     pal_packet *asset;
-    pal_packet *image;                            /* NULL: none */
+    pal_packet *image[PAL_IMAGES_MAX];            /* [info.n_image] */
     pal_packet *control_cells;                    /* of a sculptable part, else NULL */
     pal_packet *frame[PAL_STREAM_TIER_COUNT];     /* newest; NULL before the first */
     uint32_t frame_seq[PAL_STREAM_TIER_COUNT];    /* its number: increases per part, across all tiers */

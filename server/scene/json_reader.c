@@ -206,7 +206,7 @@ pal_err pal_json_box(const pal_json *at, const char *low_key, const char *high_k
 
 pal_err pal_json_text(const pal_json *at, const char *key, bool may_be_empty, char *out, size_t n_byte)
 {
-    const cJSON *item = cJSON_GetObjectItemCaseSensitive(at->value, key);
+    const cJSON *item = key[0] ? cJSON_GetObjectItemCaseSensitive(at->value, key) : at->value;
     if (!item) return PAL_ERR_OK;
     if (!cJSON_IsString(item)) return pal_json_refuse_key(at, key, "is not a text");
     size_t n = strlen(item->valuestring);

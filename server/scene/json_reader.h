@@ -60,7 +60,7 @@ pal_err pal_json_bool(const pal_json *at, const char *key, bool *out);
 pal_err pal_json_vector(const pal_json *at, const char *key, double out[3]);
 /* two corners, the first nowhere above the second; both are required */
 pal_err pal_json_box(const pal_json *at, const char *low_key, const char *high_key, double low[3], double high[3]);
-/* a text without control characters of at most n_byte - 1 bytes; empty only when allowed */
+/* a text without control characters of at most n_byte - 1 bytes; empty only when allowed. key "": `at` itself */
 pal_err pal_json_text(const pal_json *at, const char *key, bool may_be_empty, char *out, size_t n_byte);
 /* a file's name, in the folder unless it is absolute */
 pal_err pal_json_file_name(const pal_json *at, const char *key, char *out, size_t n_byte);

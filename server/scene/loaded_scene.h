@@ -18,15 +18,17 @@ typedef struct pal_loaded_scene {
     pal_scene scene;
     pal_prepared mesh[PAL_BODY_MAX];
     pal_loaded_region region[PAL_BODY_MAX][PAL_REGION_MAX];
-    pal_cells cells[PAL_BODY_MAX];            /* control cells about the body's origin; of another model none   */
-    pal_stroke *stroke[PAL_BODY_MAX];         /* what a body's strokes borrow, from malloc; NULL: none          */
-    double *spring_grid[PAL_BODY_MAX];        /* what a body's spring_grid borrows, from malloc; NULL: none */
-    pal_image image[PAL_BODY_MAX];            /* shown on the bodies; bytes NULL: none */
-    pal_loose_components loose[PAL_BODY_MAX]; /* components left out because nothing holds them */
+    pal_cells cells[PAL_BODY_MAX];                 /* control cells about the body's origin; of another model none   */
+    pal_stroke *stroke[PAL_BODY_MAX];              /* what a body's strokes borrow, from malloc; NULL: none          */
+    double *spring_grid[PAL_BODY_MAX];             /* what a body's spring_grid borrows, from malloc; NULL: none */
+    pal_image image[PAL_BODY_MAX][PAL_IMAGES_MAX]; /* shown on the bodies; bytes NULL: none */
+    pal_loose_components loose[PAL_BODY_MAX];      /* components left out because nothing holds them */
     int n_mesh;
 } pal_loaded_scene;
 
 void pal_scene_free(pal_loaded_scene *scene); /* NULL is fine */
+/* gives body `index` the images that were read for it */
+void pal_scene_show_images(pal_loaded_scene *scene, int index);
 
 /* how a bare surface or label volume is turned into a scene */
 typedef struct pal_surface_scene {
@@ -39,8 +41,8 @@ typedef struct pal_surface_scene {
     bool largest_only;     /* keep only the largest of several components         */
     double up[3];          /* unit, away from the ground; 0 0 0: (0, 0, 1)            */
     char axes[PAL_AXES_BYTES]; /* where x, y and z point in the patient, "LPS"; "": as the scan says, if it does */
-    bool no_image;             /* of pal_scene_from_surface: leave the image of an OBJ file out */
-    pal_image_map *image;      /* becomes where an image lies on an OBJ file's surface; NULL: none is shown */
+    bool no_image;             /* of pal_scene_from_surface: leave the images of an OBJ file out */
+    pal_image_map *image;      /* becomes where images lie on an OBJ file's surface; NULL: none is shown */
     const char *appearance;    /* a word of PAL_APPEARANCES; NULL: the name of the file or shape where it is one, else
                                 * plastic for control cells and none for others */
     double hold;               /* lowest part of the height held in place; 0: 0.05, of cells
@@ -68,7 +70,7 @@ typedef struct pal_surface_scene_report {
     double unit_m;
     const char *unit_name; /* "mm", "m", "given", ... */
     bool unit_guessed;     /* not given: derived from the size */
-    char image[160];       /* which image is shown, or why none that the file names; "": it names none */
+    char image[160];       /* which images are shown, or why none that the file names; "": it names none */
     double read_s;
     int resolution;
     int label;                 /* of a label volume, -1: a surface                */

@@ -5,7 +5,6 @@
 #include "server/base/flags.h"
 #include "server/base/heap.h"
 #include "server/mesh/files/mesh_file.h"
-#include "server/mesh/volume/image_seams.h"
 #include "server/scene/json_reader.h"
 #include "server/scene/region_file.h"
 #include "server/scene/scene_import.h"
@@ -136,24 +135,38 @@ static pal_err read_mesh(const pal_json *at, const pal_config_entry *model, char
         pal_surface_scene_report report = {0};
         pal_image_map map = {0};
         memcpy(options.axes, axes, PAL_AXES_BYTES);
-        if (pal_json_has(at, "image")) options.image = &map;
+        const int n_image = cJSON_GetArraySize(pal_json_at(at, "images").value);
+        if (n_image > 0) options.image = &map;
         err = pal_scene_prepare_file(file, &options, out, &report, &reason);
-        if (!err && map.n_tri) err = pal_image_seams_make(&map, out, &reason);
+        /* one image is that of all materials, several are those of the materials in the order of their first use */
+        int image[PAL_MATERIAL_MAX] = {0};
+        for (int m = 0; m < map.n_material && n_image > 1; m++) image[m] = m;
+        if (!err && map.n_tri) err = pal_image_map_take(&map, image, &out->surface);
         pal_image_map_free(&map);
         if (!err) memcpy(axes, report.axes, PAL_AXES_BYTES);
     }
     return pal_json_forward(at, key, err, &reason);
 }
 
-static pal_err read_image(const pal_json *at, const pal_prepared *mesh, pal_image *out)
+/* out [PAL_IMAGES_MAX] */
+static pal_err read_images(const pal_json *at, const pal_surface *surface, pal_image *out)
 {
     char file[FOLDER + FOLDER / 2];
     pal_diagnostic reason = {""};
-    if (!pal_json_has(at, "image")) return PAL_ERR_OK;
-    PAL_TRY(pal_json_file_name(at, "image", file, sizeof file));
-    if (!mesh->surface.uv)
-        return pal_json_refuse_key(at, "image", "the surface has no image coordinates, as vt of an OBJ file");
-    return pal_json_forward(at, "image", pal_image_read(file, out, &reason), &reason);
+    pal_json list;
+    int n = 0, n_used = 0;
+    PAL_TRY(pal_json_list(at, "images", PAL_IMAGES_MAX, &list));
+    if (!list.value) return PAL_ERR_OK;
+    if (!surface->image_at)
+        return pal_json_refuse_key(at, "images", "the surface has no image coordinates, as vt of an OBJ file");
+    PAL_JSON_ENTRIES (entry, &list) {
+        PAL_TRY(pal_json_file_name(&entry, "", file, sizeof file));
+        PAL_TRY(pal_json_forward(&entry, "", pal_image_read(file, &out[n++], &reason), &reason));
+    }
+    for (size_t t = 0; t < (size_t)surface->n_tri; t++)
+        if (surface->image_at[9 * t + 2] >= (float)n_used) n_used = 1 + (int)surface->image_at[9 * t + 2];
+    if (n_used > n) return pal_json_refuse_key(at, "images", "names %d of the %d images of the surface", n, n_used);
+    return pal_json_forward(at, "images", pal_images_check(out, n, &reason), &reason);
 }
 
 static pal_err read_lists(const pal_json *at, pal_body_def *body)
@@ -208,8 +221,8 @@ static pal_err read_body(const pal_json *at, int index, pal_loaded_scene *scene)
         PAL_TRY(pal_subdivision_read(at, scene, index));
     else
         PAL_TRY(read_mesh(at, &body->model, scene->scene.anatomical_axes, &scene->mesh[index]));
-    PAL_TRY(read_image(at, &scene->mesh[index], &scene->image[index]));
-    if (scene->image[index].bytes) body->image = &scene->image[index];
+    PAL_TRY(read_images(at, &scene->mesh[index].surface, scene->image[index]));
+    pal_scene_show_images(scene, index);
     scene->n_mesh = index + 1;
     PAL_TRY(pal_json_bool(at, "largest", &largest_only));
     pal_diagnostic reason = {""};
@@ -362,6 +375,13 @@ pal_err pal_scene_load(const char *path, pal_loaded_scene **out, pal_diagnostic 
     return err;
 }
 
+void pal_scene_show_images(pal_loaded_scene *loaded, int index)
+{
+    pal_body_def *body = &loaded->scene.body[index];
+    body->image = loaded->image[index];
+    while (body->n_image < PAL_IMAGES_MAX && body->image[body->n_image].bytes) body->n_image++;
+}
+
 void pal_scene_free(pal_loaded_scene *loaded)
 {
     if (!loaded) return;
@@ -369,7 +389,7 @@ void pal_scene_free(pal_loaded_scene *loaded)
         for (int r = 0; r < PAL_REGION_MAX; r++) PAL_FREE(loaded->region[k][r].label, loaded->region[k][r].grid);
         PAL_FREE(loaded->spring_grid[k], loaded->stroke[k]);
         pal_cells_free(&loaded->cells[k]);
-        pal_image_free(&loaded->image[k]);
+        for (int i = 0; i < PAL_IMAGES_MAX; i++) pal_image_free(&loaded->image[k][i]);
         pal_prepared_free(&loaded->mesh[k]);
     }
     free(loaded);

@@ -335,7 +335,7 @@ static pal_err make_body(pal_loaded_scene *loaded, const char *name, const pal_s
     /* a body at rest costs nothing until it is touched */
     pal_entry_init(&body->effect[body->n_effect++], "", "sleep");
     for (int k = 0; k < body->n_effect; k++) snprintf(body->effect[k].path, PAL_ENTRY_TEXT, "bodies[0].effects[%d]", k);
-    if (loaded->image[0].bytes) body->image = &loaded->image[0];
+    pal_scene_show_images(loaded, 0);
     if (options->material.young_Pa > 0) body->material = options->material;
     scene->n_body = 1;
     if (pal_norm3(options->up) > 0) pal_copy3(scene->up, options->up);
@@ -461,7 +461,7 @@ pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *option
     pal_surface_scene all = *options;
     if (!options->no_image) all.image = &map;
     pal_err err = pal_scene_prepare_file(path, &all, &loaded->mesh[0], report, diag);
-    if (!err && map.n_tri) err = pal_scene_take_image(path, &map, loaded, report, diag);
+    if (!err && map.n_tri) err = pal_scene_take_images(path, &map, loaded, report, diag);
     pal_image_map_free(&map);
     pal_diagnostic reason = {""};
     report_progress(options, "levels", 0);

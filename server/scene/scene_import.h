@@ -37,10 +37,10 @@ void pal_scene_plain_name(const char *text, const char *otherwise, char out[PAL_
 /* reads, contours a label if it is a volume, chooses the resolution, makes tetrahedra and skin; report may be NULL */
 pal_err pal_scene_prepare_file(const char *path, const pal_surface_scene *options, pal_prepared *out,
                                pal_surface_scene_report *report, pal_diagnostic *diag);
-/* The image of the first material of an OBJ file becomes that of loaded->mesh[0] (scene_image.c). A file of materials
- * or an image that is not there is no fault: report->image says so. REFUSED: it is there and cannot be shown; MEMORY */
-pal_err pal_scene_take_image(const char *path, const pal_image_map *map, pal_loaded_scene *loaded,
-                             pal_surface_scene_report *report, pal_diagnostic *diag);
+/* The images of the materials of an OBJ file become those of loaded->mesh[0] (scene_image.c). A file of materials or an
+ * image that is not there is no fault: report->image says so. REFUSED: it is there and cannot be shown; MEMORY */
+pal_err pal_scene_take_images(const char *path, const pal_image_map *map, pal_loaded_scene *loaded,
+                              pal_surface_scene_report *report, pal_diagnostic *diag);
 /* Leaves out what of body `index` nothing holds (mesh/volume/loose_components.h), once its supports and
  * effects are there, and records it in loaded->loose. Model adaptive_springs keeps all pieces. Errors name the
  * body */

@@ -9,7 +9,7 @@ static const struct {
     [PAL_KEYS_ACCURACY] = {"accuracy.", {"max_error_mm", "text"}},
     [PAL_KEYS_BUDGET] = {"budget.", {"step_ms"}},
     [PAL_KEYS_TOOL] = {"tools[].", {"name", "radius_m", "force_cap_N", "instrument", "trocar_m"}},
-    [PAL_KEYS_BODY] = {"bodies[].", {"name",    "appearance", "colour",     "largest",  "mesh",      "image",
+    [PAL_KEYS_BODY] = {"bodies[].", {"name",    "appearance", "colour",     "largest",  "mesh",      "images",
                                      "surface", "units",      "resolution", "label",    "triangles", "material",
                                      "model",   "solver",     "output",     "supports", "effects",   "regions",
                                      "cells",   "strokes",    "origin_m",   "cut"}},

@@ -38,17 +38,22 @@ static void mesh_name(const pal_scene *scene, int body, char out[MESH_NAME])
     snprintf(out + n, MESH_NAME - n, scene->body[body].cells ? ".palcells" : ".palmesh");
 }
 
-/* another surface than that of the file, as control cells have, has no place for an image */
-static bool shows_image(const pal_body_def *body)
+/* another surface than that of the file, as control cells have, has no place for images */
+static int count_images(const pal_body_def *body)
 {
-    return body->image && !body->cells && body->mesh->surface.uv;
+    return body->cells || !body->mesh->surface.image_at ? 0 : body->n_image;
 }
 
-static void image_name(const pal_scene *scene, int body, char out[MESH_NAME])
+/* "liver.png", "liver_image2.png" */
+static void image_name(const pal_scene *scene, int body, int image, char out[MESH_NAME])
 {
     stem_of(scene, body, out);
     size_t n = strlen(out);
-    snprintf(out + n, MESH_NAME - n, "%s", scene->body[body].image->ending);
+    const char *ending = scene->body[body].image[image].ending;
+    if (image)
+        snprintf(out + n, MESH_NAME - n, "_image%d%s", image + 1, ending);
+    else
+        snprintf(out + n, MESH_NAME - n, "%s", ending);
 }
 
 static cJSON *entry_json(const pal_config_entry *item)
@@ -85,11 +90,12 @@ static cJSON *body_json(const pal_scene *scene, int index)
     pal_spring_grid_append(model, &body->spring_grid);
     mesh_name(scene, index, name);
     cJSON *object = PAL_JSON({"name", JSON_TEXT(body->name)}, {"mesh", body->cells ? NULL : JSON_TEXT(name)});
-    if (shows_image(body)) {
-        image_name(scene, index, name);
-        PAL_JSON_ADD(object, {"image", JSON_TEXT(name)});
-        mesh_name(scene, index, name);
+    cJSON *images = count_images(body) ? cJSON_AddArrayToObject(object, "images") : NULL;
+    for (int k = 0; k < count_images(body); k++) {
+        image_name(scene, index, k, name);
+        cJSON_AddItemToArray(images, JSON_TEXT(name));
     }
+    mesh_name(scene, index, name);
     if (body->appearance[0]) PAL_JSON_ADD(object, {"appearance", JSON_TEXT(body->appearance)});
     if (body->colour[0]) PAL_JSON_ADD(object, {"colour", JSON_TEXT(body->colour)});
     if (body->cells) pal_subdivision_append(object, body, name);
@@ -176,16 +182,17 @@ pal_err pal_scene_make_folder(const char *folder, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
-enum { IMAGE = -2, MESH = -1 }; /* files of a body, and its regions from 0 */
+enum { IMAGE = -2, MESH = -1 }; /* files of a body: image k is IMAGE - k, and its regions count from 0 */
 
 static bool has_file(const pal_body_def *body, int file)
 {
-    return file == IMAGE ? shows_image(body) : file == MESH || body->region[file].kind == PAL_REGION_LABEL;
+    return file <= MESH || body->region[file].kind == PAL_REGION_LABEL;
 }
 
 static pal_err write_file(const pal_body_def *body, int file, const char *path, pal_diagnostic *diag)
 {
-    if (file == IMAGE) return pal_file_write(path, body->image->bytes, body->image->n_byte, diag);
+    if (file <= IMAGE)
+        return pal_file_write(path, body->image[IMAGE - file].bytes, body->image[IMAGE - file].n_byte, diag);
     if (file >= 0) return pal_region_write(body, file, path, diag);
     return body->cells ? pal_cell_file_save(body->cells, path, diag) : pal_prepared_save(body->mesh, path, diag);
 }
@@ -199,12 +206,12 @@ static pal_err each_file(const pal_scene *scene, const char *folder, bool writte
     *n_done = 0;
     for (int b = 0; b < scene->n_body; b++) {
         const pal_body_def *body = &scene->body[b];
-        for (int k = IMAGE; k < body->n_region; k++) {
+        for (int k = MESH - count_images(body); k < body->n_region; k++) {
             if (!has_file(body, k)) continue;
             if (*n_done == n_file) return PAL_ERR_OK;
             stem_of(scene, b, name);
             pal_region_volume(name, k, volume, sizeof volume);
-            if (k == IMAGE) image_name(scene, b, name);
+            if (k <= IMAGE) image_name(scene, b, IMAGE - k, name);
             if (k == MESH) mesh_name(scene, b, name);
             snprintf(path, sizeof path, "%s/%s", folder, k < 0 ? name : volume);
             if (written)

@@ -132,6 +132,28 @@ export async function open(browser, address, name, viewport) {
 export const displacement = (page) =>
     page.evaluate(() => Math.max(...[...window.palpate.state.bodies.values()].map((b) => b.maxDisplacement())));
 
+/** mean colour of a few drawn pixels around a place of the scene @param {number[]} place */
+export const colourAt = (page, place) =>
+    page.evaluate((at) => {
+        const { stage } = window.palpate;
+        stage.dirty = true;
+        stage.draw();
+        const gl = stage.renderer.getContext();
+        const { x, y } = stage.project(stage.target.clone().fromArray(at));
+        const ratio = stage.renderer.getPixelRatio();
+        const bytes = new Uint8Array(4 * 9);
+        gl.readPixels(
+            Math.round(x * ratio) - 1,
+            gl.drawingBufferHeight - Math.round(y * ratio) - 1,
+            3,
+            3,
+            gl.RGBA,
+            gl.UNSIGNED_BYTE,
+            bytes,
+        );
+        return [0, 1, 2].map((c) => bytes.reduce((sum, v, k) => sum + (k % 4 === c ? v / 9 : 0), 0));
+    }, place);
+
 /** a pixel on the organ near the middle of the picture */
 export const organPixel = (page) =>
     page.evaluate(() => {

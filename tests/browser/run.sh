@@ -1,7 +1,8 @@
 #!/bin/sh
 # The browser tests: real Chromium on a real server. usage: run.sh NAME BUILD [PICTURES], NAME being
 #   pull      two browsers share an organ that one of them pulls
-#   textured  the image of an OBJ file on its surface
+#   textured  the images of an OBJ file on its surface, tetrahedral and adaptive
+#   inside    the inner tissue that a deleted control cell shows
 #   fields    displacement, stress, energy and stiffness in colours, inside the body too: sections and clouds
 #   calibrated  a calibrated scene and its error
 #   adaptive  an adaptive surface that is refined under the tool

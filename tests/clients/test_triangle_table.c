@@ -7,7 +7,7 @@ enum { SLOTS = 60, VERTICES = 40 };
 static uint32_t load_tri[SLOTS][3];
 static float rest[VERTICES][3];
 static pal_frame_order order = {.n_vertex = VERTICES};
-static const pal_asset asset = {SLOTS, rest[0], NULL, load_tri[0], &order};
+static const pal_asset asset = {SLOTS, rest[0], NULL, NULL, load_tri[0], &order};
 static uint8_t bytes[4096];
 
 /* a patch that writes `value` into every step-th slot */

@@ -30,7 +30,7 @@ static void setup(void)
             n += 6;
         }
     if (pal_frame_order_create(rest, VERTICES, triangle, TRIANGLES, &order)) abort();
-    const pal_asset asset = {TRIANGLES, rest, NULL, triangle, order};
+    const pal_asset asset = {TRIANGLES, rest, NULL, NULL, triangle, order};
     if (pal_frame_decoder_create(&asset, &decoder)) abort();
     pal_frame_order_destroy(order);
 }

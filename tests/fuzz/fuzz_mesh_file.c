@@ -1,7 +1,6 @@
 /* The surface readers on any bytes: the first byte of the input chooses the name, and with it the reader of last
  * resort; the rest is the file. */
 #include "server/mesh/files/mesh_file.h"
-#include "server/mesh/volume/image_seams.h"
 
 #include <stdint.h>
 
@@ -21,11 +20,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
     if (pal_mesh_file_parse(name[bytes[0] % 5], bytes + 1, n_byte - 1, &options, &s, &report, &unit_m, NULL, &diag))
         return 0;
     if (map.n_tri) {
-        pal_prepared mesh;
-        if (!pal_prepared_surface(&s, &mesh)) {
-            (void)pal_image_seams_make(&map, &mesh, &diag);
-            pal_prepared_free(&mesh);
-        }
+        int image[PAL_MATERIAL_MAX];
+        for (int m = 0; m < PAL_MATERIAL_MAX; m++) image[m] = m % 3 - 1;
+        if (map.n_material < 1 || map.n_material > PAL_MATERIAL_MAX) __builtin_trap();
+        if (!pal_image_map_take(&map, image, &s))
+            for (int c = 0; c < 3 * s.n_tri; c++)
+                if (!(s.image_at[3 * c + 2] >= -1 && s.image_at[3 * c + 2] <= 1)) __builtin_trap();
     }
     pal_image_map_free(&map);
     /* what was accepted must be usable */

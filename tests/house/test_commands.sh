@@ -176,17 +176,17 @@ check "it is not missed" has out "no image: box.mtl is not there"
 printf 'newmtl skin\nmap_Kd skin.png\n' >box.mtl
 run prepare image.obj -o image --no-tetgen --units mm
 check "an image that is not there is not missed" has out "no image: skin.png is not there"
-check "an image is written" test "$(grep -c '"image":' image/scene.json)" -eq 0
+check "an image is written" test "$(grep -c '"images":' image/scene.json)" -eq 0
 png >skin.png
 run prepare image.obj -o image --no-tetgen --units mm
 check "exit code $code" code_is 0
 check "the image is not told" has out "image skin.png, 2 x 1 pixels"
 check "it is not beside the scene" cmp -s skin.png image/image.png
-check "the scene does not name it" has image/scene.json '"image":.*"image.png"'
+check "the scene does not name it" has image/scene.json '"images":.*\["image.png"\]'
 run plan image/scene.json
 check "the scene is not read again: $code" code_is 0
 run prepare image.obj -o image2 --no-tetgen --units mm --no-image
-check "an image is written that was not wanted" test ! -e image2/image2.png -a "$(grep -c '"image":' image2/scene.json)" -eq 0
+check "an image is written that was not wanted" test ! -e image2/image2.png -a "$(grep -c '"images":' image2/scene.json)" -eq 0
 printf 'GIF89a' >skin.png
 run prepare image.obj -o image3 --no-tetgen --units mm
 refused 1 "skin.png: byte 0: neither a PNG nor a JPEG image"
@@ -197,7 +197,35 @@ refused 1 "box.mtl: line 2: map_Kd: '../skin.png' is not the plain name of a fil
 sed -i 's/"mesh":.*/"mesh": "image2.palmesh",/' image/scene.json
 cp image2/image.palmesh image/image2.palmesh
 run plan image/scene.json
-refused 1 "scene.json: bodies\[0\].image: the surface has no image coordinates"
+refused 1 "scene.json: bodies\[0\].images: the surface has no image coordinates"
+sed -i 's/"mesh":.*/"surface": "..\/image.obj", "units": "mm",/; s/"images":.*/"images": ["image.png", 7],/' image/scene.json
+run plan image/scene.json
+refused 1 "scene.json: bodies\[0\].images\[1\]: is not a text"
+end
+
+begin "prepare takes the images of all materials"
+png >skin.png
+awk '$1 == "f" && ++n == 3 { print "usemtl inner skin" } { print }' image.obj >two.obj
+printf 'newmtl skin\nmap_Kd skin.png\nnewmtl inner skin\nmap_Kd fat.png\n' >box.mtl
+run prepare two.obj -o two --no-tetgen --units mm
+check "the image that is not there is not told: $code" has out "image skin.png, 2 x 1 pixels; fat.png is not there"
+png >fat.png
+printf '\003' | dd of=fat.png bs=1 seek=19 conv=notrunc 2>/dev/null
+run prepare two.obj -o two --no-tetgen --units mm
+check "exit code $code" code_is 0
+check "the images are not told" has out "2 images, the first skin.png, 2 x 1 pixels"
+check "they are not beside the scene" test "$(cmp -s skin.png two/two.png && cmp -s fat.png two/two_image2.png && echo yes)" = yes
+check "the scene does not name them" has two/scene.json '"images":.*\["two.png", "two_image2.png"\]'
+run plan two/scene.json
+check "the scene is not read again: $code" code_is 0
+sed -i 's/"images":.*/"images": ["two.png"],/' two/scene.json
+run plan two/scene.json
+refused 1 "scene.json: bodies\[0\].images: names 1 of the 2 images of the surface"
+{ cat image.obj; for k in 1 2 3 4 5 6 7 8 9; do printf 'usemtl m%d\nf 1/1 2/2 3/3\n' $k; done; } >many.obj
+for k in 1 2 3 4 5 6 7 8 9; do png >m$k.png; printf 'newmtl m%d\nmap_Kd m%d.png\n' $k $k; done >box.mtl
+run prepare many.obj -o many --no-tetgen --units mm
+refused 1 "many.obj: 9 images, a body shows at most 8"
+printf 'newmtl skin\nmap_Kd ../skin.png\n' >box.mtl
 end
 
 begin "prepare keeps where the axes point in the patient, and refuses what cannot be"

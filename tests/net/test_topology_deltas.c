@@ -319,6 +319,69 @@ static void at_rest_nothing_is_sent(void)
     end();
 }
 
+/* two images side by side on the storm's sphere: their seam is decoded at one place, and costs nothing in a frame */
+static void copies_along_a_seam_are_decoded_at_their_place(void)
+{
+    static uint8_t png[] = {0x89, 'P', 'N', 'G'}, jpeg[] = {0xFF, 0xD8, 0xFF};
+    static const pal_image image[2] = {{.bytes = png, .n_byte = sizeof png}, {.bytes = jpeg, .n_byte = sizeof jpeg}};
+    pal_surface *ball = &storm.mesh.surface;
+    pal_body_def *def = &storm.scene.body[0];
+    const bool used[PAL_STREAM_TIER_COUNT] = {true, false, false};
+    const pal_stream_tool tool[PAL_TOOL_MAX] = {{0}};
+    uint64_t n_byte[2];
+    int n_compared = 0;
+    ball->image_at = calloc(9 * (size_t)ball->n_tri, sizeof *ball->image_at);
+    REQUIRE(ball->image_at);
+    for (int t = 0; t < ball->n_tri; t++) {
+        double middle = 0;
+        for (int k = 0; k < 3; k++) middle += ball->x[3 * ball->tri[3 * t + k]];
+        for (int k = 0; k < 3; k++) ball->image_at[9 * t + 3 * k + 2] = middle > 0;
+    }
+    for (int with = 0; with < 2; with++) {
+        pal_stream *s = NULL;
+        pal_asset *asset = NULL;
+        pal_frame_decoder *decoder = NULL;
+        def->image = image, def->n_image = with ? 2 : 0;
+        served_session(&storm.scene, (pal_session_options){0});
+        REQUIRE(pal_stream_open(session, 0, NULL, &s) == PAL_ERR_OK);
+        pal_stream_part *part = &s->part[0];
+        REQUIRE(!pal_asset_decode(part->asset->bytes, part->asset->n_byte, &asset));
+        REQUIRE(!pal_frame_decoder_create(asset, &decoder));
+        CHECK_INT(part->info.n_image, def->n_image);
+        CHECK_INT(asset->look != NULL, with);
+        const pal_shown *shown = &pal_session_view_outline(session)->part[0];
+        CHECK_INT(shown->n_own, ADAPTIVE_VERTICES);
+        CHECK_INT(asset->order->n_vertex, shown->n_vertex);
+        CHECK_INT(shown->n_vertex > ADAPTIVE_VERTICES, with);
+        float *x = malloc(3 * sizeof *x * (size_t)shown->n_vertex);
+        REQUIRE(x);
+        for (int cycle = 0; cycle < CHECK_REPEATS(120, 40); cycle++) {
+            pal_frame_head head;
+            manual_clock_steps(&served_clock, 1, served_step_ns, 1);
+            REQUIRE(pal_stream_update(s, served_clock.now_ns, used, tool));
+            REQUIRE(!pal_frame_get(decoder, part->frame[0]->bytes, part->frame[0]->n_byte, &head, x));
+            for (int v = shown->n_own; v < shown->n_vertex; v++) {
+                const int32_t of = shown->copy_of[v - shown->n_own];
+                CHECK_INT(part->slots->hidden[v], part->slots->hidden[of]);
+                CHECK(!memcmp(x + 3 * v, x + 3 * of, 3 * sizeof *x));
+                n_compared += !part->slots->hidden[v];
+            }
+        }
+        n_byte[with] = s->count.n_frame_byte;
+        free(x);
+        pal_frame_decoder_destroy(decoder);
+        pal_asset_destroy(asset);
+        pal_stream_close(s);
+        pal_session_close(session);
+    }
+    printf("  %d positions compared; %llu bytes of frames, %llu with the seam\n", n_compared,
+           (unsigned long long)n_byte[0], (unsigned long long)n_byte[1]);
+    CHECK(n_compared > 1000);
+    /* a bit for each three coordinates of a group of copies, none for their values */
+    CHECK_LE((double)n_byte[1], 1.01 * (double)n_byte[0]);
+    def->n_image = 0;
+}
+
 int main(void)
 {
     if (!adaptive_scene_make(&low_gravity, ADAPTIVE_LOW_GRAVITY) || !adaptive_scene_make(&storm, ADAPTIVE_STORM) ||
@@ -326,6 +389,7 @@ int main(void)
         return 1;
     RUN(hello_tells_which_parts_adapt_and_the_asset_holds_the_finest_level);
     RUN(tables_are_the_worlds_after_many_changes);
+    RUN(copies_along_a_seam_are_decoded_at_their_place);
     RUN_SERIAL(who_skips_cycles_gets_one_patch_with_all_of_it);
     RUN(who_comes_late_gets_all_of_it_before_the_first_frame);
     RUN_LONG(a_change_of_accuracy_loses_no_triangle);

@@ -27,7 +27,7 @@ int main(int argc, char **argv)
     float *position = malloc(3 * (size_t)s.n_vertex * sizeof *position);
     size_t n_byte;
     bool good = frame && position && !pal_frame_order_create(s.rest_m, s.n_vertex, s.triangle, s.n_triangle, &order) &&
-                !pal_asset_encode(s.rest_m, NULL, order, s.triangle, s.n_triangle, &bytes, &n_byte) &&
+                !pal_asset_encode(s.rest_m, NULL, NULL, order, s.triangle, s.n_triangle, &bytes, &n_byte) &&
                 save(argv[1], "asset.bin", bytes, n_byte) && !pal_frame_encoder_create(s.rest_m, order, &e);
     for (int motion = 0; motion < MOTION_COUNT && good; motion++) {
         const pal_frame_input given = {.error_m = 5e-5, .position_m = position};

@@ -225,7 +225,7 @@ static void make_asset_and_frames(void)
     size_t n_byte = 0;
     char hash[PAL_ASSET_HASH_CHARS];
     need(!pal_frame_order_create(s.rest_m, s.n_vertex, s.triangle, s.n_triangle, &order), "order");
-    need(!pal_asset_encode(s.rest_m, NULL, order, s.triangle, s.n_triangle, &bytes, &n_byte), "asset");
+    need(!pal_asset_encode(s.rest_m, NULL, NULL, order, s.triangle, s.n_triangle, &bytes, &n_byte), "asset");
     save("asset.bin", bytes, n_byte);
     pal_asset_hash(bytes, n_byte, hash);
     fprintf(expected, "\"asset\":{\"hash\":\"%s\",\"levels\":%u,\n", hash, order->n_level);
@@ -239,7 +239,7 @@ static void make_asset_and_frames(void)
     for (size_t i = 0; i < 4 * (size_t)s.n_vertex; i++) fprintf(expected, "%s%d", i ? "," : "", order->weight[i]);
     fprintf(expected, "]},\n\"frames\":[\n");
     need(!pal_frame_encoder_create(s.rest_m, order, &e), "encoder");
-    const pal_asset asset = {s.n_triangle, s.rest_m, NULL, s.triangle, order};
+    const pal_asset asset = {s.n_triangle, s.rest_m, NULL, NULL, s.triangle, order};
     for (int i = 0; i < GOLDEN_FRAMES; i++) make_frame(&asset, e, i, i + 1 == GOLDEN_FRAMES);
     fprintf(expected, "],\n");
     make_patch(&asset);

@@ -15,7 +15,7 @@ static bool pack(packed *p, int fineness)
 {
     *p = (packed){.s = shape_create(fineness)};
     return !pal_frame_order_create(p->s.rest_m, p->s.n_vertex, p->s.triangle, p->s.n_triangle, &p->order) &&
-           !pal_asset_encode(p->s.rest_m, NULL, p->order, p->s.triangle, p->s.n_triangle, &p->bytes, &p->n_byte);
+           !pal_asset_encode(p->s.rest_m, NULL, NULL, p->order, p->s.triangle, p->s.n_triangle, &p->bytes, &p->n_byte);
 }
 
 static void unpack(packed *p)
@@ -67,24 +67,27 @@ static void comes_back_bit_for_bit(void)
     unpack(&p);
 }
 
-static void image_coordinates_come_back_and_must_be_finite(void)
+static void looks_and_image_coordinates_come_back_and_must_be_finite(void)
 {
     packed p;
     REQUIRE(pack(&p, 10));
     const size_t n = p.s.n_vertex, plain = p.n_byte;
     float *uv = malloc(2 * n * sizeof *uv);
-    REQUIRE(uv);
+    uint8_t *look = malloc(n);
+    REQUIRE(uv && look);
+    for (size_t i = 0; i < n; i++) look[i] = (uint8_t)(i % 5);
     for (size_t i = 0; i < 2 * n; i++) uv[i] = 0.37f * (float)i - 11;
     for (int bad = 0; bad < 2; bad++) {
         pal_asset *asset = NULL;
         uint8_t *bytes;
         size_t n_byte;
         if (bad) uv[2 * n - 1] = NAN;
-        REQUIRE(!pal_asset_encode(p.s.rest_m, uv, p.order, p.s.triangle, p.s.n_triangle, &bytes, &n_byte));
+        REQUIRE(!pal_asset_encode(p.s.rest_m, look, uv, p.order, p.s.triangle, p.s.n_triangle, &bytes, &n_byte));
         CHECK(n_byte > plain);
         CHECK_INT(pal_asset_decode(bytes, n_byte, &asset), bad ? PAL_REFUSAL_NAN : PAL_REFUSAL_NONE);
         if (asset) {
             CHECK(asset->uv && !memcmp(asset->uv, uv, 2 * n * sizeof *uv));
+            CHECK(asset->look && !memcmp(asset->look, look, n));
             CHECK(!memcmp(asset->rest_m, p.s.rest_m, 3 * n * sizeof(float)));
             CHECK(!memcmp(asset->order->level_begin, p.order->level_begin, (p.order->n_level + 1) * sizeof(uint32_t)));
         }
@@ -95,6 +98,7 @@ static void image_coordinates_come_back_and_must_be_finite(void)
         free(bytes);
     }
     free(uv);
+    free(look);
     unpack(&p);
 }
 
@@ -177,7 +181,7 @@ static void changed_content_behind_a_right_checksum_is_refused_or_valid(void)
 int main(void)
 {
     RUN(comes_back_bit_for_bit);
-    RUN(image_coordinates_come_back_and_must_be_finite);
+    RUN(looks_and_image_coordinates_come_back_and_must_be_finite);
     RUN(same_content_has_the_same_name_and_other_content_another);
     RUN(refuses_every_prefix_and_every_changed_byte);
     RUN(refuses_counts_that_its_bytes_cannot_hold);

@@ -19,7 +19,7 @@ static bool rig_create(trial *r, int fineness)
 {
     *r = (trial){.s = shape_create(fineness)};
     if (pal_frame_order_create(r->s.rest_m, r->s.n_vertex, r->s.triangle, r->s.n_triangle, &r->order)) return false;
-    r->asset = (pal_asset){r->s.n_triangle, r->s.rest_m, NULL, r->s.triangle, r->order};
+    r->asset = (pal_asset){r->s.n_triangle, r->s.rest_m, NULL, NULL, r->s.triangle, r->order};
     if (pal_frame_encoder_create(r->s.rest_m, r->order, &r->e)) return false;
     if (pal_frame_decoder_create(&r->asset, &r->d)) return false;
     r->cap = pal_frame_bound(r->s.n_vertex);
@@ -190,7 +190,7 @@ static void chains_of_hidden_extrapolations_stay_in_range(void)
     }
     level[N] = N;
     pal_frame_order order = {N, N, level, vertex_of, neighbour, weight};
-    const pal_asset asset = {0, rest, NULL, NULL, &order};
+    const pal_asset asset = {0, rest, NULL, NULL, NULL, &order};
     pal_frame_encoder *e = NULL;
     pal_frame_decoder *d = NULL;
     pal_frame_head head;
@@ -223,7 +223,7 @@ static void families_predict_what_is_linear_on_coarse_triangles(void)
     float *given_m = malloc(3 * (size_t)n * sizeof(float)), *shown = malloc(3 * (size_t)n * sizeof(float));
     uint8_t *bytes = malloc(pal_frame_bound(n)), *hidden = calloc(n, 1);
     REQUIRE(!pal_frame_order_hierarchy(f.fine.rest_m, n, f.n_coarse, f.parent, s.triangle, s.n_triangle, &order));
-    const pal_asset asset = {0, f.fine.rest_m, NULL, NULL, order};
+    const pal_asset asset = {0, f.fine.rest_m, NULL, NULL, NULL, order};
     REQUIRE(!pal_frame_encoder_create(f.fine.rest_m, order, &e) && !pal_frame_decoder_create(&asset, &d));
     shape_move(&s, MOTION_BEND, 30, given_m);
     for (uint32_t i = f.n_coarse; i < n; i++) {
@@ -396,7 +396,8 @@ static void tiny_and_loose_meshes_stay_within_the_bound(void)
         float given_m[18], shown[18];
         uint32_t n_triangle = n < 3 ? 0 : n < 4 ? 1 : 2;
         REQUIRE(pal_frame_order_create(rest, n, triangle, n_triangle, &order) == 0);
-        const pal_asset asset = {n_triangle, (float *)(uintptr_t)rest, NULL, (uint32_t *)(uintptr_t)triangle, order};
+        const pal_asset asset = {n_triangle, (float *)(uintptr_t)rest,        NULL,
+                                 NULL,       (uint32_t *)(uintptr_t)triangle, order};
         REQUIRE(pal_frame_encoder_create(rest, order, &e) == 0 && pal_frame_decoder_create(&asset, &d) == 0);
         for (int k = 0; k < 200; k++) {
             pal_frame_result result;

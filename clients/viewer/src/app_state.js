@@ -61,9 +61,6 @@ export class AppState {
     }
 
     countVertices() {
-        this.figures.vertices = [...this.bodies.values()].reduce(
-            (n, body) => n + body.nVisible() - body.copies.length,
-            0,
-        );
+        this.figures.vertices = [...this.bodies.values()].reduce((n, body) => n + body.nOriginal(), 0);
     }
 }

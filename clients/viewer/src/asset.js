@@ -5,20 +5,26 @@ import { checkOf, VERTEX_MAX } from "./wire.js";
 
 const MAGIC = 0x314d4c50;
 const VERSION = 1;
-const VERSION_IMAGE = 2; // with image coordinates
+const VERSION_LOOK = 2; // with looks and image coordinates
 const HEAD_BYTES = 40;
 const BYTES_MAX = 2 ** 28;
 const TRIANGLE_MAX = 2 ** 24;
 const LEVEL_MAX = 4096;
-const ONE = 4096;
+export const ONE = 4096; // sum of the weights of a predicted vertex
 const ABS_MAX = 8191;
+
+/** looks of vertices: the outside or the inside of tissue, or an image */
+export const LOOK_OUTSIDE = 0;
+export const LOOK_INSIDE = 1;
+export const LOOK_IMAGE = 2;
 
 /**
  * @typedef {{
  *   rest: Float32Array, triangles: Uint32Array, vertexOf: Uint32Array, neighbour: Uint32Array, weight: Int16Array,
- *   levels: Uint32Array, uv: Float32Array<ArrayBuffer> | null
+ *   levels: Uint32Array, look: Uint8Array<ArrayBuffer> | null, uv: Float32Array<ArrayBuffer> | null
  * }} Asset rest [n][3] m and triangles in vertex order; vertexOf [n] maps wire index to vertex; neighbour and weight
- *   [n][4] in wire order; levels: first wire index of each level; uv: image
+ *   [n][4] in wire order; levels: first wire index of each level; look
+ *   [n] in vertex order: LOOK_OUTSIDE, LOOK_INSIDE or LOOK_IMAGE + the number of an image; null: all outside; uv: image
  *   coordinates in vertex order from the lower left corner [n][2]
  */
 
@@ -43,9 +49,9 @@ function readHead(bytes) {
     );
     need(magic === MAGIC, "MAGIC", "does not begin with PLM1");
     need(
-        version === VERSION || version === VERSION_IMAGE,
+        version === VERSION || version === VERSION_LOOK,
         "KIND",
-        `version ${version}, this page reads ${VERSION} and ${VERSION_IMAGE}`,
+        `version ${version}, this page reads ${VERSION} and ${VERSION_LOOK}`,
     );
     need(zero === 0 && zero2 === 0, "FLAGS", "reserved fields");
     need(
@@ -53,7 +59,7 @@ function readHead(bytes) {
         "COUNT",
         "counts",
     );
-    const perVertex = version === VERSION_IMAGE ? 48 : 40;
+    const perVertex = version === VERSION_LOOK ? 49 : 40;
     need(
         perVertex * n + 12 * nTriangle + 4 * nLevel === nRaw && nRaw <= BYTES_MAX,
         "COUNT",
@@ -64,7 +70,7 @@ function readHead(bytes) {
     need(Math.floor(nRaw / 255) <= nLz4, "COUNT", "states more than its bytes can hold");
     const block = bytes.subarray(HEAD_BYTES);
     need(fnv1a(block) === sum, "CHECKSUM", "checksum does not match");
-    return { n, nTriangle, nLevel, nRaw, block, hasImage: version === VERSION_IMAGE };
+    return { n, nTriangle, nLevel, nRaw, block, hasLook: version === VERSION_LOOK };
 }
 
 /**
@@ -111,7 +117,7 @@ function check(asset, n) {
  * @returns {Asset}
  */
 export function decodeAsset(bytes) {
-    const { n, nTriangle, nLevel, nRaw, block, hasImage } = readHead(bytes);
+    const { n, nTriangle, nLevel, nRaw, block, hasLook } = readHead(bytes);
     const raw = new Uint8Array(nRaw);
     lz4Decode(block, raw, 0, nRaw);
 
@@ -139,9 +145,10 @@ export function decodeAsset(bytes) {
     at += 12 * nTriangle;
     const levels = planes(raw, at, nLevel);
     at += 4 * nLevel;
-    const uv = hasImage ? floats(2) : null;
+    const uv = hasLook ? floats(2) : null;
+    const look = hasLook ? raw.slice(at, at + n) : null;
 
-    const asset = { rest, triangles, vertexOf, neighbour, weight, levels, uv };
+    const asset = { rest, triangles, vertexOf, neighbour, weight, levels, look, uv };
     check(asset, n);
     return asset;
 }

@@ -1,6 +1,5 @@
 // One shown part: the geometry of decoded frames, the triangles of a part that adapts, its edges. Only vertices of the
 // triangles shown have meaningful positions.
-import { withoutCopies } from "./creases.js";
 import { FieldColours } from "./field_colours.js";
 import { vertexNormals } from "./normals.js";
 import { pickTriangle } from "./picking.js";
@@ -45,13 +44,13 @@ export class BodyMesh {
      * @param {Float32Array} rest [n][3] @param {Uint32Array} triangles [m][3]
      * @param {Uint32Array | null} visible the vertices in the triangles, null: all
      * @param {import("./tissue_looks.js").Look} look
-     * @param {Uint32Array} copies vertices of which the last ones are copies, at creases
+     * @param {Uint32Array | null} originals the vertex that each vertex stands for; null: itself
      */
-    constructor(scene, rest, triangles, visible, look, copies) {
+    constructor(scene, rest, triangles, visible, look, originals) {
         this.scene = scene;
         this.rest = rest;
         this.visible = visible;
-        this.copies = copies;
+        this.originals = originals;
         this.epoch = 0; // of its asset
         this.shown = false; // a frame has been taken: there are normals, without which it is black
         this.wanted = true;
@@ -172,11 +171,20 @@ export class BodyMesh {
         if (this.lines && !on) this.lines.visible = false;
     }
 
+    /** shown vertices without copies */
+    nOriginal() {
+        const { originals, visible } = this;
+        if (!originals) return this.nVisible();
+        if (visible) return visible.reduce((n, v) => n + Number(originals[v] === v), 0);
+        return originals.reduce((n, original, v) => n + Number(original === v), 0);
+    }
+
     /** corners of the triangles in use, of the vertices without copies: those of a closed surface are joined */
     triangles() {
         const index = /** @type {THREE.BufferAttribute} */ (this.geometry.index);
         const drawn = /** @type {Uint32Array} */ (index.array).subarray(0, this.nCorner);
-        return withoutCopies(drawn, this.copies, this.rest.length / 3);
+        const { originals } = this;
+        return originals ? drawn.map((v) => originals[v]) : drawn;
     }
 
     /** the surface as drawn, for a file @returns {import("./exporters.js").Surface} */

@@ -1,7 +1,8 @@
 // The bodies on the stage: a body of a new topology replaces the shown one with its first frame, and the newest frame of
 // each part is applied once per drawn picture.
 import { BodyMesh } from "./body_mesh.js";
-import { showImage } from "./surface_image.js";
+import { showImages } from "./surface_image.js";
+import { BufferAttribute } from "./three.js";
 import { lookOf } from "./tissue_looks.js";
 
 export const UNSEEN = 2e-5; // motion in units of the scene's size that is not worth a new picture: below 1/20 pixel
@@ -40,12 +41,14 @@ export class BodySet {
     }
 
     /** @param {Extract<import("./link.js").PageMessage, {type: "part"}>} message */
-    takePart({ part, epoch, rest, uv, copies, triangles, visible }) {
+    takePart({ part, epoch, rest, look, uv, originals, triangles, visible }) {
         this.pending.get(part)?.dispose();
         this.frames.delete(part); // of the older topology
-        const { appearance, colour, image } = this.state.parts[part] ?? {};
-        const body = new BodyMesh(this.stage.scene, rest, triangles, visible, lookOf(appearance, colour), copies);
-        if (uv && image) showImage(body, uv, image, this.stage);
+        const { appearance, colour, images } = this.state.parts[part] ?? {};
+        const tissue = lookOf(appearance, colour);
+        const body = new BodyMesh(this.stage.scene, rest, triangles, visible, tissue, originals);
+        if (look) body.geometry.setAttribute("look", new BufferAttribute(look, 1));
+        if (uv && images?.length) showImages(body, uv, images, tissue.colour, this.stage);
         const waits = this.state.bodies.has(part);
         body.epoch = epoch;
         body.appear(!waits);

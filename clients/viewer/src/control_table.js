@@ -11,7 +11,7 @@ const part = /** @type {const} */ ({
     n_vertex: "u32",
     n_triangle: "u32",
     asset: "text",
-    "image?": "text",
+    "images?": "texts",
     error_m: "f64",
     "fields?": "texts",
     "interior?": "text",

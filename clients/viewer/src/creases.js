@@ -21,11 +21,13 @@ function unitNormals(x, triangles) {
 
 /**
  * @param {Float32Array} rest [n][3] @param {Uint32Array} triangles [m][3]
- * @returns {{triangles: Uint32Array, copies: Uint32Array}} the triangles with the copies' numbers, n and up; the vertex
- *   that each of them copies
+ * @param {Uint32Array} seams copies that the asset has already: copy, original, copy, original ...
+ * @returns {{triangles: Uint32Array, copies: Uint32Array, joined: Uint32Array}} the triangles with the copies' numbers, n
+ *   and up; the vertex that each of them copies; pairs of vertices that are drawn with one normal, as `seams`
  */
-export function splitCreases(rest, triangles) {
+export function splitCreases(rest, triangles, seams = new Uint32Array()) {
     const n = rest.length / 3;
+    const place = originalsOf(n, seams);
     const normal = unitNormals(rest, triangles);
     const limit = Math.cos((CREASE_DEGREES * Math.PI) / 180);
     // corners that are joined across smooth sides share a vertex
@@ -43,7 +45,7 @@ export function splitCreases(rest, triangles) {
     for (let corner = 0; corner < triangles.length; corner++) {
         const t = corner - (corner % 3);
         const after = t + ((corner + 1) % 3);
-        const [a, b] = [triangles[corner], triangles[after]];
+        const [a, b] = [place[triangles[corner]], place[triangles[after]]];
         const other = open.get(b * n + a);
         if (other === undefined) {
             open.set(a * n + b, corner);
@@ -58,21 +60,40 @@ export function splitCreases(rest, triangles) {
     }
     const split = triangles.slice();
     const copies = [];
-    /** @type {Map<number, number>} vertex of each group of corners */
+    const oneNormal = [];
+    /** @type {Map<number, number>} vertex of each group of corners and vertex of the asset; first one of each group */
     const vertexOf = new Map();
+    /** @type {Map<number, number>} */
+    const first = new Map();
     const used = new Uint8Array(n);
     for (let corner = 0; corner < triangles.length; corner++) {
         const group = root(corner);
-        let vertex = vertexOf.get(group);
+        const original = triangles[corner];
+        const key = group * n + original;
+        let vertex = vertexOf.get(key);
         if (vertex === undefined) {
-            const original = triangles[corner];
             vertex = used[original] ? n + copies.push(original) - 1 : original;
             used[original] = 1;
-            vertexOf.set(group, vertex);
+            vertexOf.set(key, vertex);
+            const same = first.get(group);
+            if (same === undefined) first.set(group, vertex);
+            else oneNormal.push(vertex, same);
         }
         split[corner] = vertex;
     }
-    return { triangles: split, copies: Uint32Array.from(copies) };
+    return { triangles: split, copies: Uint32Array.from(copies), joined: Uint32Array.from(oneNormal) };
+}
+
+/**
+ * The vertex that each vertex stands for.
+ * @param {number} n @param {Uint32Array} pairs copy, original, copy, original ...
+ * @param {Uint32Array} more vertex of each copy that follows the n
+ */
+export function originalsOf(n, pairs, more = new Uint32Array()) {
+    const of = Uint32Array.from({ length: n + more.length }, (_, v) => v);
+    for (let k = 0; k < pairs.length; k += 2) of[pairs[k]] = pairs[k + 1];
+    more.forEach((vertex, i) => (of[n + i] = of[vertex]));
+    return of;
 }
 
 /**
@@ -85,10 +106,4 @@ export function fillCopies(values, copies, size) {
     copies.forEach((vertex, i) => {
         for (let k = 0; k < size; k++) values[begin + size * i + k] = values[size * vertex + k];
     });
-}
-
-/** triangles of the vertices that copies stand for @param {Uint32Array} triangles @param {Uint32Array} copies @param {number} n all */
-export function withoutCopies(triangles, copies, n) {
-    const begin = n - copies.length;
-    return copies.length ? triangles.map((v) => (v < begin ? v : copies[v - begin])) : triangles;
 }

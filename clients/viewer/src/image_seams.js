@@ -1,28 +1,18 @@
-// Doubled vertices along the seams of an image: they have one rest position, and are drawn at one place with one normal.
-// Pure.
+// Copies of vertices where neighbouring triangles look differently, as along the seams of an image: they lie at one place
+// and are drawn with one normal, unless the surface bends there (creases.js). Pure.
+import { ONE } from "./asset.js";
 
 /**
- * The copies in a rest shape, each with the first vertex at its place.
- * @param {Float32Array} rest [n][3] @returns {Uint32Array} copy, original, copy, original ...
+ * The copies of an asset, each with the vertex at its place, from which alone it is predicted.
+ * @param {import("./asset.js").Asset} asset @returns {Uint32Array} copy, original, copy, original ...
  */
-export function findCopies(rest) {
-    /** @type {Map<string, number>} */
-    const first = new Map();
+export function findCopies({ look, vertexOf, neighbour, weight }) {
     /** @type {number[]} */
     const pairs = [];
-    for (let v = 0; v < rest.length / 3; v++) {
-        const place = `${rest[3 * v]} ${rest[3 * v + 1]} ${rest[3 * v + 2]}`;
-        const original = first.get(place);
-        if (original === undefined) first.set(place, v);
-        else pairs.push(v, original);
-    }
+    for (let i = 0; look && i < vertexOf.length; i++)
+        if (neighbour[4 * i] === neighbour[4 * i + 1] && 2 * weight[4 * i] === ONE && 2 * weight[4 * i + 1] === ONE)
+            pairs.push(vertexOf[i], vertexOf[neighbour[4 * i]]);
     return Uint32Array.from(pairs);
-}
-
-/** @param {Uint32Array} copies @param {Float32Array} positions [n][3] */
-export function joinPositions(copies, positions) {
-    for (let k = 0; k < copies.length; k += 2)
-        positions.copyWithin(3 * copies[k], 3 * copies[k + 1], 3 * copies[k + 1] + 3);
 }
 
 /**
@@ -37,5 +27,6 @@ export function joinNormals(copies, normals) {
         const length = Math.hypot(normals[i], normals[i + 1], normals[i + 2]);
         for (let c = 0; c < 3 && length > 0; c++) normals[i + c] /= length;
     }
-    joinPositions(copies, normals);
+    for (let k = 0; k < copies.length; k += 2)
+        normals.copyWithin(3 * copies[k], 3 * copies[k + 1], 3 * copies[k + 1] + 3);
 }

@@ -3,11 +3,11 @@
 import { decodeAsset } from "./asset.js";
 import { CommandQueue } from "./command_queue.js";
 import { readControl } from "./control_reader.js";
-import { fillCopies, splitCreases } from "./creases.js";
+import { fillCopies, originalsOf, splitCreases } from "./creases.js";
 import { decodeField, readFieldHead } from "./field_decoder.js";
 import { InteriorLink } from "./interior_link.js";
 import { FrameDecoder, readFrameHead } from "./frame_decoder.js";
-import { findCopies, joinNormals, joinPositions } from "./image_seams.js";
+import { findCopies, joinNormals } from "./image_seams.js";
 import { vertexNormals } from "./normals.js";
 import { text as textOf } from "./text.js";
 import { applyTopologyDelta, readTopologyDeltaHead, shownOf } from "./topology_delta.js";
@@ -53,8 +53,8 @@ const FINAL = new Map([
  * Messages from the worker to the page.
  * @typedef {{type: "state", state: ConnectionState, text: string}
  *   | {type: "control", message: ServerMessage}
- *   | ({type: "part", part: number, epoch: number, rest: Float32Array, uv: Float32Array<ArrayBuffer> | null,
- *       copies: Uint32Array} & Shown)
+ *   | ({type: "part", part: number, epoch: number, rest: Float32Array, look: Uint8Array<ArrayBuffer> | null,
+ *       uv: Float32Array<ArrayBuffer> | null, originals: Uint32Array | null} & Shown)
  *   | ({type: "frame", part: number, shown: Shown | null} & FrameArrays)
  *   | {type: "field", part: number, name: string, low: number, high: number, level: Uint8Array}
  *   | import("./interior_link.js").InteriorMesh | import("./interior_link.js").InteriorValues
@@ -80,10 +80,21 @@ const FINAL = new Map([
  *   later: (call: () => void, ms: number) => void,
  * }} Environment
  * @typedef {{decoder: FrameDecoder, table: Uint32Array, shown: Shown, changed: boolean, epoch: number, n: number,
- *   creases: Uint32Array, spare: FrameArrays[], copies: Uint32Array}} Part copies: of image_seams.js; table: of
+ *   creases: Uint32Array, spare: FrameArrays[], joined: Uint32Array}} Part joined: pairs of vertices with one normal; table: of
  *   triangles, up to date; shown: of the table at the last frame; changed: the table has changed since; n: vertices of
  *   the asset; creases: vertices that creases add to them, copies of these
  */
+
+/**
+ * Values of the asset's vertices, then those of the copies behind them.
+ * @template {Float32Array | Uint8Array} T
+ * @param {T} values @param {Uint32Array} creases @param {T} longer @param {number} size
+ */
+function extended(values, creases, longer, size) {
+    longer.set(values);
+    fillCopies(longer, creases, size);
+    return longer;
+}
 
 /** close reason: at most 123 bytes of ASCII @param {unknown} error */
 const closeReason = (error) =>
@@ -337,15 +348,21 @@ export class Link {
             // only a readable asset resets the pause: a server with unreadable assets is asked ever more slowly
             this.tries = 0;
             const n = asset.rest.length / 3;
+            const seams = findCopies(asset);
             // cuts have sharp edges
-            const { triangles, copies: creases } =
-                info.sculptable && !asset.uv
-                    ? splitCreases(asset.rest, asset.triangles)
-                    : { triangles: asset.triangles, copies: NONE };
-            const shown = shownOf(triangles, n + creases.length);
-            const rest = new Float32Array(3 * (n + creases.length));
-            rest.set(asset.rest);
-            fillCopies(rest, creases, 3);
+            const {
+                triangles,
+                copies: creases,
+                joined,
+            } = info.sculptable
+                ? splitCreases(asset.rest, asset.triangles, seams)
+                : { triangles: asset.triangles, copies: NONE, joined: seams };
+            const all = n + creases.length;
+            const shown = shownOf(triangles, all);
+            const rest = extended(asset.rest, creases, new Float32Array(3 * all), 3);
+            const look = asset.look && extended(asset.look, creases, new Uint8Array(all), 1);
+            const uv = asset.uv && extended(asset.uv, creases, new Float32Array(2 * all), 2);
+            const originals = seams.length || creases.length ? originalsOf(n, seams, creases) : null;
             this.parts.set(index, {
                 decoder: new FrameDecoder(asset),
                 table: asset.triangles,
@@ -355,10 +372,9 @@ export class Link {
                 n,
                 creases,
                 spare: [],
-                copies: asset.uv ? findCopies(asset.rest) : NONE,
+                joined,
             });
-            const { uv } = asset;
-            this.env.post({ type: "part", part: index, epoch: info.epoch, rest, uv, copies: creases, ...shown });
+            this.env.post({ type: "part", part: index, epoch: info.epoch, rest, look, uv, originals, ...shown });
             this.decodeEarly(index);
         } catch (error) {
             if (generation === this.generation && this.requested.get(index) === info.epoch)
@@ -435,13 +451,12 @@ export class Link {
         };
         part.decoder.decode(bytes, positions.subarray(0, 3 * part.n));
         fillCopies(positions, part.creases, 3);
-        joinPositions(part.copies, positions);
         const ms = this.env.now() - begin;
         const shown = part.changed ? shownOf(part.table, part.n) : null;
         if (shown) part.shown = shown;
         part.changed = false;
         vertexNormals(positions, part.shown.triangles, normals, part.shown.visible);
-        joinNormals(part.copies, normals);
+        joinNormals(part.joined, normals);
         this.decodeUs += Math.round(1000 * ms);
         this.decodeSum += ms;
         this.nDecoded++;

@@ -40,7 +40,7 @@ export function makeTissue(uniforms, look) {
     const surface = tissueShader(look);
     Object.assign(/** @type {{defines: object}} */ (/** @type {unknown} */ (material)).defines, surface.defines);
     material.onBeforeCompile = (shader) => {
-        surface.extend(shader);
+        surface.extend(shader, material.userData.images ?? []);
         shader.uniforms.mapMix = uniforms.mix;
         shader.uniforms.mapRange = uniforms.range;
         shader.uniforms.mapOlder = uniforms.older;

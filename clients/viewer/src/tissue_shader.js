@@ -4,6 +4,7 @@
 // A pattern gives the gradient g of the height at rest. Over the picture the height changes by g . dFdx(rest), which holds
 // for every deformation; three's formula of bump maps turns these differences into a normal (Mikkelsen, Simulation of
 // wrinkled surfaces revisited, 2008). Vessels are a flat picture laid on from three sides (triplanar), by the normal at rest.
+import { LOOK_IMAGE, LOOK_INSIDE } from "./asset.js";
 import * as THREE from "./three.js";
 import { drawVessels, growVessels, makeCells, makeNoise } from "./tissue_patterns.js";
 
@@ -48,19 +49,51 @@ function allPatterns() {
     return patterns;
 }
 
+/** images that a body may have (PAL_IMAGES_MAX of server/mesh/files/image_file.h) */
+const IMAGES_MAX = 8;
+
 const VERTEX_HEAD = `
+attribute float look;
+varying float vLook;
+#ifdef TISSUE_IMAGES
+varying vec2 vImageAt;
+#endif
 #ifdef TISSUE_VESSELS
 attribute vec3 restNormal;
 varying vec3 vRestNormal;
 #endif`;
 const VERTEX = `
+vLook = look;
+#ifdef TISSUE_IMAGES
+vImageAt = uv;
+#endif
 #ifdef TISSUE_VESSELS
 vRestNormal = restNormal;
 #endif`;
 
+/** an array of samplers takes constant numbers only */
+const imageChoice = Array.from(
+    { length: IMAGES_MAX },
+    (_, k) => `
+#if TISSUE_IMAGES > ${k}
+  if (vLook > ${LOOK_IMAGE - 0.5 + k}) colour = texture(tissueImages[${k}], vImageAt).rgb;
+#endif`,
+).join("");
+
 const HEAD = `
 uniform vec3 tissueInner, tissueGlow;
 uniform float tissueScatter;
+varying float vLook; // the same at all corners of a triangle
+bool isImage = false;
+bool isInside = false;
+#ifdef TISSUE_IMAGES
+uniform sampler2D tissueImages[TISSUE_IMAGES];
+varying vec2 vImageAt;
+vec3 tissueImage() {
+  vec3 colour = vec3(0.0);${imageChoice}
+  return colour;
+}
+#endif
 vec3 tissueSlope = vec3(0.0); // gradient of the height at rest
 float tissueFilm = 1.0; // factor of the film's roughness
 #ifdef TISSUE_PATTERNS
@@ -105,17 +138,23 @@ vec3 tissueVessel(vec3 surface) {
 }
 #endif`;
 
-// an image of the body's own has its colours already
+// an image has its colours already; the inside has no vessels, which lie on the outside
 const COLOUR = `
-#if defined(TISSUE_PATTERNS) && !defined(USE_MAP)
-diffuseColor.rgb = tissueColour(diffuseColor.rgb);
-#endif
-#if defined(TISSUE_VESSELS) && !defined(USE_MAP)
-diffuseColor.rgb = tissueVessel(diffuseColor.rgb);
-#endif
+isInside = abs(vLook - ${LOOK_INSIDE}.0) < 0.5;
 #ifdef DOUBLE_SIDED
-if (!gl_FrontFacing) diffuseColor.rgb = tissueInner * (diffuseColor.rgb / max(diffuse, vec3(0.02)));
-#endif`;
+isInside = isInside || !gl_FrontFacing;
+#endif
+#ifdef TISSUE_IMAGES
+isImage = !isInside && vLook > ${LOOK_IMAGE - 0.5};
+if (isImage) diffuseColor.rgb = tissueImage();
+#endif
+#ifdef TISSUE_PATTERNS
+if (!isImage) diffuseColor.rgb = tissueColour(diffuseColor.rgb);
+#endif
+#ifdef TISSUE_VESSELS
+if (!isImage && !isInside) diffuseColor.rgb = tissueVessel(diffuseColor.rgb);
+#endif
+if (isInside) diffuseColor.rgb = tissueInner * (diffuseColor.rgb / max(diffuse, vec3(0.02)));`;
 
 // with the colours of a field the surface is smooth
 const BUMP = `
@@ -164,8 +203,10 @@ function after(code, chunk, more) {
 
 /**
  * @param {import("./tissue_looks.js").Look} look
- * @returns {{defines: Record<string, string>, extend: (shader: THREE.WebGLProgramParametersWithUniforms) => void}} what a
- *   physical material needs to have this look; its geometry has `rest`, and `restNormal` with TISSUE_VESSELS
+ * @returns {{defines: Record<string, string>,
+ *   extend: (shader: THREE.WebGLProgramParametersWithUniforms, images: THREE.Texture[]) => void}} what a physical material
+ *   needs to have this look; its geometry has `rest`, and `restNormal` with TISSUE_VESSELS, and may have `look` of its
+ *   vertices and `uv` in the images; TISSUE_IMAGES: number of images
  */
 export function tissueShader(look) {
     /** @type {Record<string, string>} */
@@ -208,8 +249,8 @@ export function tissueShader(look) {
     }
     return {
         defines,
-        extend: (shader) => {
-            Object.assign(shader.uniforms, uniforms);
+        extend: (shader, images) => {
+            Object.assign(shader.uniforms, uniforms, { tissueImages: { value: images } });
             shader.vertexShader = after(shader.vertexShader, "common", VERTEX_HEAD);
             shader.vertexShader = after(shader.vertexShader, "begin_vertex", VERTEX);
             for (const [chunk, more] of [

@@ -1,7 +1,7 @@
 // Surfaces are split where they bend sharply, and nowhere else.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { fillCopies, splitCreases, withoutCopies } from "../src/creases.js";
+import { fillCopies, originalsOf, splitCreases } from "../src/creases.js";
 import { vertexNormals } from "../src/normals.js";
 
 /** a cube of edge 1 with outward triangles */
@@ -21,7 +21,11 @@ test("each side of a cube has its own vertices, whose normals are those of the s
     const x = new Float32Array(3 * 24);
     x.set(cube);
     fillCopies(x, copies, 3);
-    assert.deepEqual(withoutCopies(triangles, copies, 24), sides);
+    const originals = originalsOf(8, new Uint32Array(), copies);
+    assert.deepEqual(
+        triangles.map((v) => originals[v]),
+        sides,
+    );
     const normals = new Float32Array(x.length);
     vertexNormals(x, triangles, normals);
     for (let v = 0; v < 24; v++) {
@@ -60,4 +64,22 @@ test("values of copies are those of what they copy", () => {
     const level = Uint8Array.from([5, 6, 7, 0, 0]);
     fillCopies(level, Uint32Array.from([2, 0]), 1);
     assert.deepEqual([...level], [5, 6, 7, 7, 5]);
+});
+
+test("copies of the asset are split at creases, and have one normal where the surface bends by less", () => {
+    // two squares side by side, the right one of copies 6 and 7 of the vertices 1 and 4 between them
+    const seams = Uint32Array.from([6, 1, 7, 4]);
+    const triangles = Uint32Array.from([...[0, 1, 4, 0, 4, 3], ...[6, 2, 5, 6, 5, 7]]);
+    const bent = (/** @type {number} */ angle) => {
+        const [x, z] = [1 + Math.cos(angle), Math.sin(angle)];
+        return Float32Array.from([...[0, 0, 0, 1, 0, 0, x, 0, z, 0, 1, 0], ...[1, 1, 0, x, 1, z, 1, 0, 0, 1, 1, 0]]);
+    };
+    const smooth = splitCreases(bent(0.5), triangles, seams);
+    assert.deepEqual(smooth.triangles, triangles);
+    assert.equal(smooth.copies.length, 0);
+    assert.deepEqual([...smooth.joined], [6, 1, 7, 4]);
+    const sharp = splitCreases(bent(1.5), triangles, seams);
+    assert.deepEqual(sharp.triangles, triangles);
+    assert.equal(sharp.joined.length, 0);
+    assert.deepEqual([...originalsOf(8, seams, Uint32Array.of(7, 2))], [0, 1, 2, 3, 4, 5, 1, 4, 4, 2]);
 });

@@ -1,9 +1,9 @@
-// Images on surfaces: assets with image coordinates, and what is drawn at the doubled vertices of a seam.
+// Images and the inside of tissue on surfaces: assets with looks, and what is drawn at the copies along a seam.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { decodeAsset } from "../src/asset.js";
-import { findCopies, joinNormals, joinPositions } from "../src/image_seams.js";
+import { findCopies, joinNormals } from "../src/image_seams.js";
 import { lz4Decode } from "../src/lz4.js";
 
 const HEAD = 40;
@@ -17,17 +17,18 @@ function lz4Literals(raw) {
     return Uint8Array.from([0xf0, ...length, rest, ...raw]);
 }
 
-/** the golden asset as version 2 @param {Float32Array} uv */
+/** the golden asset as version 2, vertex k with look k modulo 4 @param {Float32Array} uv */
 function withImage(uv) {
     const old = new DataView(golden.buffer, golden.byteOffset);
     const nRaw = old.getUint32(20, true);
-    const raw = new Uint8Array(nRaw + 4 * uv.length);
+    const raw = new Uint8Array(nRaw + 4.5 * uv.length);
     lz4Decode(golden.subarray(HEAD), raw.subarray(0, nRaw), 0, nRaw);
     const bytes = new Uint8Array(uv.buffer);
     const n = uv.length / 2;
     for (let c = 0; c < 2; c++)
         for (let i = 0; i < n; i++)
             for (let p = 0; p < 4; p++) raw[nRaw + 4 * n * c + p * n + i] = bytes[4 * (2 * i + c) + p];
+    for (let i = 0; i < n; i++) raw[nRaw + 8 * n + i] = i % 4;
     const block = lz4Literals(raw);
     const out = new Uint8Array(HEAD + block.length);
     out.set(golden.subarray(0, HEAD));
@@ -42,13 +43,17 @@ function withImage(uv) {
     return out;
 }
 
-test("an asset of version 2 has image coordinates behind all that version 1 has", () => {
+test("an asset of version 2 has image coordinates and looks behind all that version 1 has", () => {
     const plain = decodeAsset(golden);
-    assert.equal(plain.uv, null);
+    assert.deepEqual([plain.uv, plain.look], [null, null]);
     const uv = Float32Array.from({ length: (2 * plain.rest.length) / 3 }, (none, k) => 0.1 * k - 3);
     const asset = decodeAsset(withImage(uv));
     assert.deepEqual(asset.uv, uv);
-    assert.deepEqual({ ...asset, uv: null }, plain);
+    assert.deepEqual(
+        [...(asset.look ?? [])],
+        Array.from({ length: uv.length / 2 }, (none, k) => k % 4),
+    );
+    assert.deepEqual({ ...asset, uv: null, look: null }, plain);
 });
 
 test("an asset whose image coordinates are not finite, or whose version is another, is refused", () => {
@@ -62,17 +67,23 @@ test("an asset whose image coordinates are not finite, or whose version is anoth
     assert.throws(() => decodeAsset(other), /counts do not fit/);
 });
 
-test("copies are the vertices at the place of an earlier one", () => {
-    const rest = Float32Array.from([0, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 1e-7, 1, 0, 0, 0, 0, 0]);
-    assert.deepEqual(findCopies(rest), Uint32Array.from([2, 0, 4, 1, 5, 0]));
-    assert.equal(findCopies(Float32Array.from([1, 2, 3, 4, 5, 6])).length, 0);
+test("copies are the vertices that follow from one other alone", () => {
+    const asset = decodeAsset(withImage(new Float32Array((2 * decodeAsset(golden).rest.length) / 3)));
+    assert.equal(findCopies(asset).length, 0);
+    const n = asset.vertexOf.length;
+    const weight = asset.weight.slice();
+    const neighbour = asset.neighbour.slice();
+    weight.set([2048, 2048, 0, 0], 4 * (n - 1));
+    neighbour.set([5, 5, 0, 0], 4 * (n - 1));
+    weight.set([2048, 2048, 0, 0], 4 * (n - 2)); // a midpoint
+    neighbour.set([5, 6, 0, 0], 4 * (n - 2));
+    const { vertexOf } = asset;
+    assert.deepEqual([...findCopies({ ...asset, weight, neighbour })], [vertexOf[n - 1], vertexOf[5]]);
+    assert.equal(findCopies({ ...asset, weight, neighbour, look: null }).length, 0);
 });
 
-test("copies are drawn at one place, with one normal of all their triangles", () => {
+test("copies are drawn with one normal of all their triangles", () => {
     const copies = Uint32Array.from([2, 0, 3, 0]);
-    const positions = Float32Array.from([1, 2, 3, 9, 9, 9, 1.1, 2, 3, 1, 2, 2.9]);
-    joinPositions(copies, positions);
-    assert.deepEqual([...positions], [1, 2, 3, 9, 9, 9, 1, 2, 3, 1, 2, 3]);
     const normals = Float32Array.from([1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 1, 0]);
     joinNormals(copies, normals);
     const expected = [1 / Math.sqrt(5), 2 / Math.sqrt(5), 0];

@@ -526,7 +526,9 @@ static pal_err set_sharpness(builder *b)
                           (double)PAL_SHARPNESS_MAX);
         pal_cell_face *face = &c->face[c->face_use[tag->a].face];
         face->sharp = fmaxf(face->sharp, tag->sharp);
+        face->inside |= tag->b != 0;
     }
+    for (int32_t f = 0; f < c->n_face; f++) c->face[f].inside |= c->face[f].use[1] >= 0;
     return PAL_ERR_OK;
 }
 

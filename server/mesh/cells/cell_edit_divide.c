@@ -27,7 +27,7 @@ typedef struct division {
     int32_t *corner; /* and the vertex in the middle of the edge from each to the next, new or old            */
     int32_t *mid;
     int32_t *centre; /* vertex in the middle of each side, new or old */
-    float *sharp;    /* of the face at each corner                    */
+    int32_t *at;     /* the face at each corner; -1: none             */
 } division;
 
 static pal_err division_reserve(const pal_cells *c, int32_t cell, division *s)
@@ -44,7 +44,7 @@ static pal_err division_reserve(const pal_cells *c, int32_t cell, division *s)
     PAL_ARRAY(&err, s->corner, n_use);
     PAL_ARRAY(&err, s->mid, n_use);
     PAL_ARRAY(&err, s->centre, n_use);
-    PAL_ARRAY(&err, s->sharp, n_use);
+    PAL_ARRAY(&err, s->at, n_use);
     return err;
 }
 
@@ -170,7 +170,7 @@ static void find_roles(division *s)
 }
 
 /* a vertex of the open side, in order; hanging ones go between */
-static void add_side_vertex(division *s, int32_t vertex, float sharp)
+static void add_side_vertex(division *s, int32_t vertex, int32_t face)
 {
     int32_t *end = &s->start[s->n_side + 1];
     if (s->role[vertex] == HANGING) {
@@ -178,7 +178,7 @@ static void add_side_vertex(division *s, int32_t vertex, float sharp)
         *(*end == s->start[s->n_side] ? &s->centre[s->n_side] : &s->mid[*end - 1]) = vertex;
         return;
     }
-    s->corner[*end] = vertex, s->mid[*end] = -1, s->sharp[*end] = sharp;
+    s->corner[*end] = vertex, s->mid[*end] = -1, s->at[*end] = face;
     (*end)++;
 }
 
@@ -200,16 +200,16 @@ static void list_sides(division *s)
         int32_t face = c->face_use[f].face;
         if (s->face[face] >= 0) continue;
         for (int32_t u = c->face_use[f].first_use; u < c->face_use[f + 1].first_use; u++)
-            add_side_vertex(s, c->edge_use[u].vertex, c->face[face].sharp);
+            add_side_vertex(s, c->edge_use[u].vertex, face);
         end_side(s, -2 - face);
     }
     for (int32_t i = 0; i < s->n_vertex; i++) {
         if (s->role[s->order[i]] != CENTRE) continue;
         int32_t use = corner_use(s, s->order[i]), u = use;
         do {
-            add_side_vertex(s, opposite_corner(c, u), c->face[pal_cells_face_of(c, u)].sharp);
+            add_side_vertex(s, opposite_corner(c, u), pal_cells_face_of(c, u));
             u = pal_cells_next_around(c, u);
-            add_side_vertex(s, pal_cells_end_vertex(c, u), 0);
+            add_side_vertex(s, pal_cells_end_vertex(c, u), -1);
         } while (u != use);
         end_side(s, s->order[i]);
     }
@@ -256,8 +256,11 @@ static void add_midpoints(pal_edit_work *w, division *s)
 static void add_outer_vertices(pal_edit_work *w, const division *s, int32_t side, int32_t i, bool reversed)
 {
     int32_t before = s->mid[i > s->start[side] ? i - 1 : s->start[side + 1] - 1], after = s->mid[i];
-    pal_cell_loops_quad(&w->to, s->sharp[i], s->corner[i], reversed ? before : after, s->centre[side],
+    const pal_cell_face *face = s->at[i] < 0 ? NULL : &s->c->face[s->at[i]];
+    w->to.inside = face && face->inside;
+    pal_cell_loops_quad(&w->to, face ? face->sharp : 0, s->corner[i], reversed ? before : after, s->centre[side],
                         reversed ? after : before);
+    w->to.inside = false;
 }
 
 /* middle of the side that runs to a corner over the edge of vertex mid */
@@ -293,7 +296,9 @@ static void add_neighbour(pal_edit_work *w, const division *s, int32_t cell)
             for (int32_t i = s->start[side]; i < s->start[side + 1]; i++) add_outer_vertices(w, s, side, i, true);
             continue;
         }
+        w->to.inside = c->face[c->face_use[f].face].inside;
         pal_cell_loops_face(&w->to, c->face[c->face_use[f].face].sharp);
+        w->to.inside = false;
         for (int32_t u = c->face_use[f].first_use; u < c->face_use[f + 1].first_use; u++) {
             const int32_t vertex[2] = {c->edge_use[u].vertex, s->edge[c->edge_use[u].edge]};
             pal_cell_loops_corners(&w->to, vertex, 1 + (vertex[1] >= 0));
@@ -348,7 +353,7 @@ static pal_err divide_one(const pal_cells *from, int32_t cell, pal_cells_edit *o
     pal_edit_work w = pal_edit_begin(from, diag, "divide cell %d", cell);
     division s = {0};
     pal_err err = divide(&w, cell, &s);
-    PAL_FREE(s.edge, s.face, s.role, s.order, s.start, s.corner, s.mid, s.centre, s.sharp);
+    PAL_FREE(s.edge, s.face, s.role, s.order, s.start, s.corner, s.mid, s.centre, s.at);
     return pal_edit_finish(&w, err, out);
 }
 

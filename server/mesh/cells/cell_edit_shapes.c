@@ -22,6 +22,7 @@ static void add_prism(pal_edit_work *w, int32_t n, const int32_t *base, const in
     pal_cell_loops *to = &w->to;
     pal_cell_loops_append(to, c, NULL, NULL);
     pal_cell_loops_cell(to);
+    to->inside = true;
     pal_cell_loops_face(to, 0);
     for (int32_t k = n - 1; k >= 0; k--) pal_cell_loops_corners(to, &base[k], 1);
     pal_cell_loops_face(to, 0);

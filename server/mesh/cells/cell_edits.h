@@ -7,7 +7,8 @@
  *
  * Numbers after an edit: old vertices and cells keep theirs, new ones follow them; where some are removed, later ones
  * move up. Edges and faces are numbered again. Sharpness stays with its vertex, edge or face; parts of a divided edge
- * or face inherit it; all new features are smooth. Collisions of a new part with distant parts of the solid are not
+ * or face inherit it; all new features are smooth. So does it stay whether a face is inside (pal_cell_face.inside); new
+ * faces are, and those that an edit opens. Collisions of a new part with distant parts of the solid are not
  * checked. Thread: [load]. */
 #ifndef PAL_MESH_CELLS_CELL_EDITS_H
 #define PAL_MESH_CELLS_CELL_EDITS_H

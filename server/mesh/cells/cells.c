@@ -107,8 +107,8 @@ void pal_cell_loops_cell(pal_cell_loops *l)
 void pal_cell_loops_face(pal_cell_loops *l, float sharp)
 {
     if ((l->n_loop == 0 && !ROOM(l, loop, 0)) || !ROOM(l, loop, l->n_loop + 1)) return;
-    if (sharp > 0 && ROOM(l, face_tag, l->n_face_tag))
-        l->face_tag[l->n_face_tag++] = (pal_cell_tag){l->n_loop, 0, sharp};
+    if ((sharp > 0 || l->inside) && ROOM(l, face_tag, l->n_face_tag))
+        l->face_tag[l->n_face_tag++] = (pal_cell_tag){l->n_loop, l->inside, sharp};
     l->loop[l->n_loop++] = l->n_corner;
     l->loop[l->n_loop] = l->n_corner;
     l->cell[l->n_cell] = l->n_loop;
@@ -158,7 +158,9 @@ void pal_cell_loops_append(pal_cell_loops *l, const pal_cells *c, const bool *ke
         if (keep && !keep[i]) continue;
         pal_cell_loops_cell(l);
         for (int32_t f = c->cell_use[i]; f < c->cell_use[i + 1]; f++) {
+            l->inside = c->face[c->face_use[f].face].inside;
             pal_cell_loops_face(l, c->face[c->face_use[f].face].sharp);
+            l->inside = false;
             for (int32_t u = c->face_use[f].first_use; u < c->face_use[f + 1].first_use; u++)
                 pal_cell_loops_corners(l, map ? &map[c->edge_use[u].vertex] : &c->edge_use[u].vertex, 1);
         }

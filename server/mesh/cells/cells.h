@@ -23,7 +23,7 @@ enum { PAL_CELL_LOOP_MAX = 256 }; /* corners of a face */
 
 /* sharpness of an edge by its two vertices in any order, or of a face by its loop's number */
 typedef struct pal_cell_tag {
-    int32_t a, b; /* edge: vertices; face: loop, 0 */
+    int32_t a, b; /* edge: vertices; face: loop, and 1 where it is inside */
     float sharp;  /* 0..PAL_SHARPNESS_MAX             */
 } pal_cell_tag;
 
@@ -45,6 +45,7 @@ typedef struct pal_cell_loops {
     int32_t count_from;   /* what messages call vertex, cell and face 0: 1 in files that count from 1         */
     /* of loops that are added one by one (below): loops and corners so far, the first error */
     int32_t n_loop, n_corner;
+    bool inside; /* the faces that come are (pal_cell_face.inside) */
     pal_err err;
 } pal_cell_loops;
 
@@ -58,6 +59,7 @@ typedef struct pal_cell_edge {
 typedef struct pal_cell_face {
     int32_t use[2]; /* face uses, ascending; use[1] = -1: a boundary face. Its loop is that of use[0] */
     float sharp;
+    bool inside; /* between two cells, or was when it was made, or made by an edit: where it shows, it is cut tissue */
 } pal_cell_face;
 
 typedef struct pal_face_use {

@@ -94,3 +94,20 @@ void pal_image_free(pal_image *image)
     free(image->bytes);
     memset(image, 0, sizeof *image);
 }
+
+pal_err pal_images_check(const pal_image *image, int n, pal_diagnostic *diag)
+{
+    size_t n_byte = 0, n_pixel = 0;
+    if (n > PAL_IMAGES_MAX) return PAL_REFUSE(diag, "%d images, a body shows at most %d", n, PAL_IMAGES_MAX);
+    for (int k = 0; k < n; k++) {
+        n_byte += image[k].n_byte;
+        n_pixel += (size_t)image[k].width * (size_t)image[k].height;
+    }
+    if (n_byte > PAL_IMAGE_MAX_BYTE)
+        return PAL_REFUSE(diag, "%d images with together %zu bytes, those of a body have at most %d", n, n_byte,
+                          PAL_IMAGE_MAX_BYTE);
+    if (n_pixel > PAL_IMAGES_MAX_PIXEL)
+        return PAL_REFUSE(diag, "%d images with together %zu pixels, those of a body have at most %d", n, n_pixel,
+                          PAL_IMAGES_MAX_PIXEL);
+    return PAL_ERR_OK;
+}

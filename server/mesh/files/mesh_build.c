@@ -47,6 +47,8 @@ static pal_err add_triangle(pal_mesh_build *build, int64_t a, int64_t b, int64_t
 {
     if (build->takes_image) {
         PAL_TRY(grow(build, &build->tri_vt, build->n_tri, sizeof *build->tri_vt));
+        PAL_TRY(grow(build, &build->tri_material, build->n_tri, sizeof *build->tri_material));
+        build->tri_material[build->n_tri] = build->now_material;
         int32_t *vt = build->tri_vt + 3 * build->n_tri;
         vt[0] = build->fan_first_vt, vt[1] = build->fan_last_vt, vt[2] = build->corner_vt;
     }

@@ -4,6 +4,7 @@
 #define PAL_MESH_FILES_MESH_BUILD_H
 #include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/text_scan.h"
+#include "server/mesh/geometry/image_map.h"
 
 typedef struct pal_mesh_build {
     const char *name; /* file name for messages                                          */
@@ -20,7 +21,9 @@ typedef struct pal_mesh_build {
     double *vt;      /* [n_vt][2]                                                       */
     int32_t *tri_vt; /* [n_tri][3], indices not yet checked against n_vt                */
     size_t n_vt;
-    char library[128], material[128];             /* file of materials, first material; "": none             */
+    int32_t *tri_material;                        /* number of the material of each triangle [n_tri] */
+    pal_material_name library, *material;         /* file of materials, names in the order of first use [n_material] */
+    int n_material, now_material;                 /* now: of the faces that come */
     int64_t max_index, max_index_at;              /* largest index of any face (-1 at first) and its place      */
     int64_t first_at;                             /* place of the first face, 0: none yet                       */
     int64_t fan_first, fan_last;                  /* the open polygon                                           */

@@ -40,32 +40,33 @@ static pal_err parse(pal_mesh_build *build)
     return PAL_ERR_OK;
 }
 
-/* the triangles that have image coordinates at all corners, as they stand in the file */
-static pal_err take_image(const pal_mesh_build *build, pal_image_map *out)
+/* the triangles as they stand in the file, but those that cleaning drops: with a corner that is NaN or infinite */
+static pal_err take_image(pal_mesh_build *build, pal_image_map *out)
 {
     pal_err err = PAL_ERR_OK;
     PAL_ARRAY(&err, out->x, 9 * build->n_tri);
-    PAL_ARRAY(&err, out->uv, 6 * build->n_tri);
+    PAL_ARRAY(&err, out->at, 9 * build->n_tri);
     if (err) return pal_diagnostic_set(build->diag, err, "%s: no memory for image coordinates", build->name);
     for (size_t t = 0; t < build->n_tri; t++) {
         const int32_t *vt = build->tri_vt + 3 * t;
-        bool whole = true; /* and no corner is NaN or infinite, which cleaning drops */
-        for (int k = 0; k < 3; k++) {
-            const double *x = build->x + 3 * (size_t)build->tri[3 * t + (size_t)k];
+        bool finite = true, whole = true;
+        for (size_t k = 0; k < 3; k++) {
+            const double *x = build->x + 3 * (size_t)build->tri[3 * t + k];
             whole = whole && vt[k] >= 0 && (size_t)vt[k] < build->n_vt;
-            for (int a = 0; a < 3; a++) whole = whole && fabs(x[a]) < 1e30;
+            for (int a = 0; a < 3; a++) finite = finite && fabs(x[a]) < 1e30;
         }
-        if (!whole) continue;
-        for (int k = 0; k < 3; k++) {
-            memcpy(out->x + 9 * (size_t)out->n_tri + 3 * k, build->x + 3 * (size_t)build->tri[3 * t + (size_t)k],
-                   3 * sizeof *out->x);
-            for (int c = 0; c < 2; c++)
-                out->uv[6 * (size_t)out->n_tri + (size_t)(2 * k + c)] = (float)build->vt[2 * (size_t)vt[k] + (size_t)c];
+        if (!finite) continue;
+        for (size_t k = 0; k < 3; k++) {
+            const size_t at = 9 * (size_t)out->n_tri + 3 * k;
+            memcpy(out->x + at, build->x + 3 * (size_t)build->tri[3 * t + k], 3 * sizeof *out->x);
+            for (size_t c = 0; c < 2; c++) out->at[at + c] = whole ? (float)build->vt[2 * (size_t)vt[k] + c] : 0;
+            out->at[at + 2] = whole ? (float)build->tri_material[t] : -1;
         }
         out->n_tri++;
     }
     memcpy(out->library, build->library, sizeof out->library);
-    memcpy(out->material, build->material, sizeof out->material);
+    out->n_material = build->n_material, out->material = build->material;
+    build->material = NULL;
     return PAL_ERR_OK;
 }
 
@@ -148,7 +149,7 @@ pal_err pal_mesh_file_parse(const char *name, const uint8_t *bytes, size_t n_byt
         if (unit_m) *unit_m = unit;
         for (size_t k = 0; k < 9 * (size_t)image.n_tri; k++) image.x[k] = image.x[k] * unit - s.origin_m[k % 3];
     }
-    PAL_FREE(build.vt, build.tri_vt);
+    PAL_FREE(build.vt, build.tri_vt, build.tri_material, build.material);
     if (err) {
         pal_surface_free(&s);
         pal_image_map_free(&image);

@@ -15,7 +15,7 @@
 typedef struct pal_mesh_file_options {
     double unit_m;        /* metres per file unit; 0: guess with pal_mesh_unit_guess */
     double weld;          /* relative tolerance of pal_surface_clean; < 0: do not clean at all */
-    pal_image_map *image; /* becomes where an image lies on the surface, pal_image_map_free; NULL: not asked */
+    pal_image_map *image; /* becomes where images lie on the surface, pal_image_map_free; NULL: not asked */
 } pal_mesh_file_options;
 
 /* Reads path, cleans it, scales it to metres; each reader's file says what it takes. Triangles that cleaning leaves

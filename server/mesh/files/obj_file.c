@@ -1,6 +1,7 @@
 /* Wavefront OBJ: positions and faces (n-gons as fans, negative indices, v/vt/vn forms, continuation lines); where an
- * image is asked for, image coordinates, the file of materials and the first material too; everything else is left
+ * image is asked for, image coordinates, the file of materials and the materials of faces too; everything else is left
  * out. */
+#include "server/base/heap.h"
 #include "server/mesh/files/mesh_build.h"
 
 #include <math.h>
@@ -82,15 +83,49 @@ static pal_err read_image_point(pal_mesh_build *build, pal_text_scan *scan)
     return pal_mesh_image_point(build, uv);
 }
 
-/* the first name of its kind: all of the line, as names may have spaces */
-static void read_name(const pal_text_scan *scan, char out[128])
+/* a name: all of the line, as names may have spaces */
+static void read_name(const pal_text_scan *scan, pal_material_name out)
 {
     pal_text_scan at = *scan;
     size_t n = 0;
-    if (out[0] || !pal_text_more(&at)) return;
-    for (const uint8_t *p = at.at; p < at.end && *p >= 0x20 && n < 127; p++) out[n++] = (char)*p;
+    if (pal_text_more(&at))
+        for (const uint8_t *p = at.at; p < at.end && *p >= 0x20 && n < PAL_MATERIAL_NAME - 1; p++) out[n++] = (char)*p;
     while (n > 0 && out[n - 1] == ' ') n--;
     out[n] = 0;
+}
+
+/* the material of the faces that come */
+static pal_err use_material(pal_mesh_build *build, const pal_text_scan *scan, const pal_material_name name)
+{
+    for (int k = 0; k < build->n_material; k++)
+        if (!strcmp(build->material[k], name)) return build->now_material = k, PAL_ERR_OK;
+    if (build->n_material == PAL_MATERIAL_MAX)
+        return PAL_MESH_REFUSE(build, scan->line, "more than %d materials", PAL_MATERIAL_MAX);
+    if (!pal_heap_grow(&build->material, (size_t)build->n_material, sizeof *build->material))
+        return pal_diagnostic_set(build->diag, PAL_ERR_MEMORY, "%s: no memory for a material", build->name);
+    memcpy(build->material[build->n_material], name, sizeof *build->material);
+    build->now_material = build->n_material++;
+    return PAL_ERR_OK;
+}
+
+/* faces before the first usemtl have a material without name */
+static pal_err begin_face(pal_mesh_build *build, const pal_text_scan *scan)
+{
+    static const pal_material_name none = "";
+    return build->takes_image && build->n_material == 0 ? use_material(build, scan, none) : PAL_ERR_OK;
+}
+
+/* the first file of materials counts */
+static void read_library(pal_mesh_build *build, const pal_text_scan *scan)
+{
+    if (!build->library[0]) read_name(scan, build->library);
+}
+
+static pal_err read_material(pal_mesh_build *build, const pal_text_scan *scan)
+{
+    pal_material_name name = "";
+    read_name(scan, name);
+    return use_material(build, scan, name);
 }
 
 pal_err pal_obj_parse(pal_mesh_build *build)
@@ -102,14 +137,15 @@ pal_err pal_obj_parse(pal_mesh_build *build)
     do {
         if (pal_text_is(&scan, "v"))
             PAL_TRY(pal_mesh_position(build, &scan, "a position"));
-        else if (pal_text_is(&scan, "f"))
+        else if (pal_text_is(&scan, "f")) {
+            PAL_TRY(begin_face(build, &scan));
             PAL_TRY(read_face(build, &scan));
-        else if (build->takes_image && pal_text_is(&scan, "vt"))
+        } else if (build->takes_image && pal_text_is(&scan, "vt"))
             PAL_TRY(read_image_point(build, &scan));
         else if (build->takes_image && pal_text_is(&scan, "mtllib"))
-            read_name(&scan, build->library);
+            read_library(build, &scan);
         else if (build->takes_image && pal_text_is(&scan, "usemtl"))
-            read_name(&scan, build->material);
+            PAL_TRY(read_material(build, &scan));
         else
             PAL_TRY(skip_line(build, &scan));
     } while (pal_text_next_line(&scan));

@@ -11,7 +11,7 @@
 
 void pal_surface_free(pal_surface *surface)
 {
-    PAL_FREE(surface->x, surface->tri, surface->uv);
+    PAL_FREE(surface->x, surface->tri, surface->image_at);
     memset(surface, 0, sizeof *surface);
 }
 
@@ -21,8 +21,8 @@ pal_err pal_surface_copy(const pal_surface *from, pal_surface *to)
     pal_err err = PAL_ERR_OK;
     PAL_ARRAY(&err, copy.x, 3 * (size_t)from->n_vertex);
     PAL_ARRAY(&err, copy.tri, 3 * (size_t)from->n_tri);
-    if (from->uv) PAL_ARRAY(&err, copy.uv, 2 * (size_t)from->n_vertex);
-    if (!err && from->uv) memcpy(copy.uv, from->uv, 2 * (size_t)from->n_vertex * sizeof *copy.uv);
+    if (from->image_at) PAL_ARRAY(&err, copy.image_at, 9 * (size_t)from->n_tri);
+    if (!err && from->image_at) memcpy(copy.image_at, from->image_at, 9 * (size_t)from->n_tri * sizeof *copy.image_at);
     if (!err && from->n_vertex) memcpy(copy.x, from->x, 3 * (size_t)from->n_vertex * sizeof *copy.x);
     if (!err && from->n_tri) memcpy(copy.tri, from->tri, 3 * (size_t)from->n_tri * sizeof *copy.tri);
     if (err)
@@ -109,8 +109,8 @@ void pal_surface_drop_unused(pal_surface *s, int32_t *map)
         pal_copy3(s->x + 3 * (size_t)n++, s->x + 3 * (size_t)i);
     }
     s->n_vertex = n;
-    PAL_FREE(s->uv);
-    s->uv = NULL;
+    PAL_FREE(s->image_at);
+    s->image_at = NULL;
     for (size_t c = 0; c < 3 * (size_t)s->n_tri; c++) s->tri[c] = map[s->tri[c]];
 }
 

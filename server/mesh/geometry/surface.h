@@ -15,7 +15,9 @@ typedef struct pal_surface {
     double *x;          /* position relative to origin_m, m     [n_vertex][3] */
     int32_t *tri;       /* vertex indices                       [n_tri][3]    */
     double origin_m[3]; /* file position (in m) = x + origin_m                */
-    float *uv; /* place in its image from the lower left corner, NULL: none (volume/image_seams.h) [n_vertex][2] */
+    /* places of the corners in images, u and v from the lower left corner, and the number of the triangle's image, -1:
+     * none; NULL: the surface has no images (image_map.h) [n_tri][3][3] */
+    float *image_at;
 } pal_surface;
 
 /* counts of what reading and cleaning dropped, joined or repaired */
@@ -62,7 +64,7 @@ typedef struct pal_surface_side {
  * start [n_vertex+1], side [3 n_tri]; the caller frees both; MEMORY */
 pal_err pal_surface_sides(const pal_surface *surface, int32_t **start, pal_surface_side **side);
 
-/* drops vertices of no triangle, and uv, and keeps the order of the others; map [n_vertex] is scratch */
+/* drops vertices of no triangle, and image_at, and keeps the order of the others; map [n_vertex] is scratch */
 void pal_surface_drop_unused(pal_surface *surface, int32_t *map);
 
 /* edge-connected components: label of each triangle [n_tri] (caller's memory), number out; MEMORY */

@@ -60,7 +60,7 @@ typedef struct section {
 static void list_sections(pal_prepared *p, const uint64_t count[N_COUNT], section out[N_SECTION])
 {
     uint64_t n_vertex = count[0], n_tri = count[1], n_node = count[2], n_tet = count[3], n_face = count[4],
-             n_frame = count[5], n_fan = count[6], n_fill = count[7], n_uv = count[8],
+             n_frame = count[5], n_fan = count[6], n_fill = count[7], n_image_at = count[8],
              n_near = n_frame ? PAL_SKIN_NEIGHBOURS * n_vertex : 0;
     const section all[N_SECTION] = {{&p->surface.x, 8, 3 * n_vertex},
                                     {&p->surface.tri, 4, 3 * n_tri},
@@ -77,7 +77,7 @@ static void list_sections(pal_prepared *p, const uint64_t count[N_COUNT], sectio
                                     {&p->skin.near, 4, n_near},
                                     {&p->skin.coef, 4, 4 * n_near},
                                     {&p->hexes.fill, 4, n_fill},
-                                    {&p->surface.uv, 4, 2 * n_uv}};
+                                    {&p->surface.image_at, 4, 9 * n_image_at}};
     memcpy(out, all, sizeof all);
 }
 
@@ -93,7 +93,7 @@ static void get_counts(const pal_prepared *p, uint64_t count[N_COUNT])
                             p->skin.n_frame,
                             n_fan,
                             n_fill,
-                            p->surface.uv ? p->surface.n_vertex : 0};
+                            p->surface.image_at ? p->surface.n_tri : 0};
     for (int k = 0; k < N_COUNT; k++) count[k] = (uint64_t)n[k];
 }
 
@@ -204,7 +204,7 @@ static size_t round_up(size_t n)
 pal_err pal_prepared_bytes(const pal_prepared *prepared, uint8_t **bytes_out, size_t *n_byte_out)
 {
     pal_prepared p = *prepared;
-    const uint32_t version = p.surface.uv ? VERSION_MAX : VERSION;
+    const uint32_t version = p.surface.image_at ? VERSION_MAX : VERSION;
     layout l = layout_of(version);
     uint64_t count[N_COUNT];
     section s[N_SECTION];
@@ -313,8 +313,8 @@ static const char *find_fault(const pal_prepared *p, const uint64_t count[N_COUN
         if (tets->on_surface[i] > 1) return "a surface tag is neither 0 nor 1";
     for (uint64_t i = 0; i < count[7]; i++)
         if (!(p->hexes.fill[i] >= 0 && p->hexes.fill[i] <= 1)) return "a voxel's fill is not within 0..1";
-    if (count[8] && count[8] != count[0]) return "not every vertex has image coordinates";
-    if (!all_finite_float(surface->uv, 2 * count[8])) return "an image coordinate is not finite";
+    if (count[8] && count[8] != count[1]) return "not every triangle has image coordinates";
+    if (!all_finite_float(surface->image_at, 9 * count[8])) return "an image coordinate is not finite";
     return NULL;
 }
 
@@ -400,8 +400,8 @@ pal_err pal_prepared_parse(const char *name, const uint8_t *bytes, size_t n_byte
         const uint8_t *place = bytes + l.table - 32;
         put_counts(&p, count);
         if (!count[8]) {
-            free(p.surface.uv);
-            p.surface.uv = NULL;
+            free(p.surface.image_at);
+            p.surface.image_at = NULL;
         }
         memcpy(p.tets.origin_m, place, 24);
         memcpy(p.surface.origin_m, p.tets.origin_m, 24);

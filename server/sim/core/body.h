@@ -71,6 +71,8 @@ typedef struct pal_display {
     const int32_t *shown_node;  /* node of each shown vertex when skin is NULL                           [n_shown] */
     const int32_t *shown_face;  /* of solids: control face of each shown triangle, -1: inside a cut; NULL: another
                                    body                                                                    [n_tri] */
+    /* of solids: 1 where a shown triangle was not on the boundary at load; NULL: all were [n_tri] */
+    const uint8_t *shown_inside;
     /* tetrahedra of nodes that fill a solid, for sections; NULL: those of the mesh do, or nothing [n_tet][4] */
     const int32_t *tet;
     int n_tet;

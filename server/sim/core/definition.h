@@ -78,7 +78,9 @@ typedef struct pal_body_def {
     char appearance[PAL_APPEARANCE_BYTES]; /* a word of PAL_APPEARANCES; "": unknown */
     char colour[PAL_COLOUR_BYTES];         /* "#rrggbb" in place of the appearance's own; "": its own */
     const pal_prepared *mesh;              /* borrowed                                                        */
-    const pal_image *image;                /* shown on mesh->surface, which has uv then; borrowed; NULL: none */
+    /* shown on mesh->surface, whose image_at has their numbers; borrowed [n_image] */
+    int n_image;
+    const pal_image *image;
     /* model subdivision_fem: control cells, body frame, borrowed; NULL for other models. mesh then has the triangles of
      * the control cells' boundary alone (surface), for size, origin and messages */
     const pal_cells *cells;

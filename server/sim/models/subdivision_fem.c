@@ -71,7 +71,8 @@ static pal_err keep_boundary(const boundary *from, pal_build *build)
     double *x = PAL_NEW(build->arena, double, 3 * n);
     int32_t *tri = PAL_NEW(build->arena, int32_t, 3 * m), *node = PAL_NEW(build->arena, int32_t, n),
             *face = PAL_NEW(build->arena, int32_t, m);
-    if (!surface || !x || !tri || !node || !face) return PAL_ERR_MEMORY;
+    uint8_t *inside = PAL_NEW(build->arena, uint8_t, m);
+    if (!surface || !x || !tri || !node || !face || !inside) return PAL_ERR_MEMORY;
     memcpy(x, from->surface.x, 3 * n * sizeof *x);
     memcpy(tri, from->surface.tri, 3 * m * sizeof *tri);
     memcpy(node, from->node, n * sizeof *node);
@@ -79,6 +80,8 @@ static pal_err keep_boundary(const boundary *from, pal_build *build)
     for (size_t t = 0; t < m; t++) {
         int32_t control = origin[from->face[t]];
         face[t] = control >= 0 && pal_cells_face_boundary(build->def->cells, control) ? control : -1;
+        inside[t] = face[t] < 0 || build->def->cells->face[control].inside;
+        if (inside[t]) build->body->display.shown_inside = inside;
     }
     *surface = (pal_surface){.n_vertex = from->surface.n_vertex, .n_tri = from->surface.n_tri, .x = x, .tri = tri};
     memcpy(surface->origin_m, build->def->mesh->surface.origin_m, sizeof surface->origin_m);

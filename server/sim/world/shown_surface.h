@@ -4,6 +4,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+/* what is drawn: the outside or the inside of tissue, or an image of the body, which is PAL_LOOK_IMAGE + its number */
+typedef enum pal_look { PAL_LOOK_OUTSIDE, PAL_LOOK_INSIDE, PAL_LOOK_IMAGE } pal_look;
+
 /* pointers borrow from the world and its scene and are valid while revision is the same */
 typedef struct pal_shown {
     const char *name;
@@ -11,13 +14,24 @@ typedef struct pal_shown {
     const float *rest_m; /* scene frame             [n_vertex][3] */
     const int32_t *tri;  /* counter-clockwise, as at load; of an adaptive body the slot table, 0 0 0 in empty slots
                             (pal_frame_part.slot brings its changes) [n_tri][3] */
-    const float *uv;     /* image coordinates of the vertices (pal_surface.uv); NULL: none [n_vertex][2] */
+    /* what each vertex looks like, and its place in its image; NULL: all are the outside of tissue */
+    const uint8_t *look; /* pal_look                [n_vertex]    */
+    const float *uv;     /* 0 0 where no image is   [n_vertex][2] */
+    /* Where neighbouring triangles look differently, or lie in different places of an image (a seam), they have
+     * vertices of their own: the vertices from n_own on are copies, each of copy_of[i - n_own]. They are always at its
+     * place. Triangle t draws vertex copy_pair[2 k] as copy_pair[2 k + 1], copy_start[t] <= k < copy_start[t + 1]; t
+     * counts the triangles at load, of which each has 4^slot_level slots */
+    int n_own;
+    const int32_t *copy_of;    /* [n_vertex - n_own] */
+    const int32_t *copy_start; /* NULL: no copies    */
+    const int32_t *copy_pair;
+    int slot_level;
     uint64_t revision;
     const int32_t
         *face; /* control face of each triangle, -1: none (body.shown_face); NULL: no subdivision solid [n_tri] */
     bool is_adaptive; /* triangles change at run time */
-    /* Refinement hierarchy of vertices beyond those of `tri`: vertex i >= n_coarse is the midpoint of the smaller
-     * vertices parent[2 (i - n_coarse)], parent[.. + 1]; NULL: no hierarchy */
+    /* Vertices that follow from others: vertex i >= n_coarse is the midpoint of the smaller vertices parent[2 (i -
+     * n_coarse)], parent[.. + 1], which are the same for a copy; NULL: none does */
     int n_coarse;
     const int32_t *parent;
     int n_coarse_tri;

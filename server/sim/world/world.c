@@ -5,6 +5,7 @@
 #include "server/base/vec3.h"
 #include "server/sim/core/step_guard.h"
 #include "server/sim/implicit/lowest_frequency.h"
+#include "server/sim/world/shown_copies.h"
 #include "server/sim/world/world_core.h"
 
 #include <stdlib.h>
@@ -129,28 +130,47 @@ static pal_err make_hierarchy(pal_world *w, const pal_levels *levels, pal_shown 
     return PAL_ERR_OK;
 }
 
-/* a midpoint lies in the middle of its edge in the image too */
-static pal_err make_image_places(pal_world *w, const float *coarse, pal_shown *p)
+/* u, v and look of the corners of the shown triangles: of the images, of the inside of a solid; heap, NULL: all are the
+ * outside of tissue */
+static pal_err find_looks(const pal_body_def *def, const pal_body *body, int n_tri, float **out)
 {
-    float *uv = PAL_NEW(w->arena, float, 2 * (size_t)p->n_vertex);
-    if (!uv) return PAL_ERR_MEMORY;
-    memcpy(uv, coarse, 2 * (size_t)p->n_coarse * sizeof *uv);
-    for (int i = p->n_coarse; i < p->n_vertex; i++) {
-        const int32_t *parent = p->parent + 2 * (size_t)(i - p->n_coarse);
-        for (int c = 0; c < 2; c++) uv[2 * i + c] = 0.5f * (uv[2 * parent[0] + c] + uv[2 * parent[1] + c]);
-    }
-    p->uv = uv;
+    const float *image_at = body->display.skin || body->active ? def->mesh->surface.image_at : NULL;
+    const uint8_t *inside = body->display.shown_inside;
+    *out = NULL;
+    if (!(image_at && def->n_image > 0) && !inside) return PAL_ERR_OK;
+    float *corner = calloc(9 * (size_t)n_tri + 1, sizeof *corner);
+    if (!corner) return PAL_ERR_MEMORY;
+    for (size_t t = 0; t < (size_t)n_tri; t++)
+        for (size_t c = 3 * t; c < 3 * t + 3; c++) {
+            if (inside) corner[3 * c + 2] = inside[t] ? PAL_LOOK_INSIDE : PAL_LOOK_OUTSIDE;
+            if (inside || !(image_at[3 * c + 2] >= 0 && image_at[3 * c + 2] < (float)def->n_image)) continue;
+            memcpy(corner + 3 * c, image_at + 3 * c, 3 * sizeof *corner);
+            corner[3 * c + 2] += PAL_LOOK_IMAGE;
+        }
+    *out = corner;
     return PAL_ERR_OK;
 }
 
-static pal_err make_part(pal_world *w, int b)
+static pal_err make_looks(pal_world *w, const pal_body_def *def, const pal_body *body, pal_shown *p)
+{
+    const int n_tri = body->active ? p->n_coarse_tri : p->n_tri;
+    float *corner;
+    PAL_TRY(find_looks(def, body, n_tri, &corner));
+    if (!corner) return PAL_ERR_OK;
+    pal_err err =
+        pal_shown_copies_make(p, n_tri, body->active ? p->coarse_tri : p->tri, corner, body->dofs.levels, w->arena);
+    free(corner);
+    return err;
+}
+
+static pal_err make_part(pal_world *w, const pal_body_def *def, int b)
 {
     const pal_body *body = &w->plan.body[b];
     const pal_display *display = &body->display;
     pal_shown *p = &w->part[b];
     p->name = body->name;
     if (display->n_shown == 0) return PAL_ERR_OK;
-    p->n_vertex = display->n_shown;
+    p->n_vertex = p->n_own = display->n_shown;
     p->n_tri = body->active ? body->dofs.n_slot : display->surface->n_tri;
     float *rest_m = PAL_NEW(w->arena, float, 3 * (size_t)p->n_vertex);
     int32_t *tri = PAL_NEW(w->arena, int32_t, 3 * (size_t)p->n_tri);
@@ -166,9 +186,8 @@ static pal_err make_part(pal_world *w, int b)
     pal_copy3(p->offset_m, body->offset_m);
     if (body->tets) p->n_node = body->tets->n_node, p->n_tet = body->tets->n_tet, p->tet = body->tets->tet;
     if (display->tet) p->n_node = body->n_node, p->n_tet = display->n_tet, p->tet = display->tet;
-    if (display->skin) p->uv = display->surface->uv;
     PAL_TRY(body->active ? make_hierarchy(w, body->dofs.levels, p) : PAL_ERR_OK);
-    return body->active && display->surface->uv ? make_image_places(w, display->surface->uv, p) : PAL_ERR_OK;
+    return make_looks(w, def, body, p);
 }
 
 void pal_world_show(pal_world *w, int b)
@@ -215,7 +234,7 @@ static pal_err create(pal_world *w, const pal_scene *scene, pal_diagnostic *diag
         w->material[b] = scene->body[b].material;
         PAL_TRY(pal_material_check(&w->material[b], diag));
         pal_world_keep_lowest(w, b);
-        PAL_TRY(make_part(w, b));
+        PAL_TRY(make_part(w, &scene->body[b], b));
     }
     PAL_TRY(pal_field_components_check(&w->plan, diag));
     PAL_TRY(pal_world_check_budget(w, diag));

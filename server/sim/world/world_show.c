@@ -2,6 +2,7 @@
 
 #include "server/base/hash.h"
 #include "server/base/vec3.h"
+#include "server/sim/world/shown_copies.h"
 #include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
@@ -18,13 +19,22 @@ static void copy_nodes(const pal_body *body, const double *value, int n_node, fl
     }
 }
 
-static void copy_fields(const pal_body *body, pal_frame_part *to)
+/* values of the copies of vertices, of n bytes each */
+static void fill_copies(const pal_shown *shown, void *values, size_t n)
+{
+    char *at = values;
+    for (int i = shown->n_own; i < shown->n_vertex; i++)
+        memcpy(at + n * (size_t)i, at + n * (size_t)shown->copy_of[i - shown->n_own], n);
+}
+
+static void copy_fields(const pal_shown *shown, const pal_body *body, pal_frame_part *to)
 {
     for (int k = 0; k < PAL_FIELD_COUNT; k++) {
         const pal_shown_field *from = body->display.field[k];
         pal_frame_field *field = &to->field[k];
         if (!from || !field->value || field->revision == from->revision) continue;
-        memcpy(field->value, from->value, sizeof(float) * (size_t)to->n_vertex);
+        memcpy(field->value, from->value, sizeof(float) * (size_t)shown->n_own);
+        fill_copies(shown, field->value, sizeof(float));
         if (field->node) copy_nodes(body, from->node, to->n_node, field->node);
         field->revision = from->revision;
         field->time_s = from->time_s;
@@ -32,16 +42,20 @@ static void copy_fields(const pal_body *body, pal_frame_part *to)
 }
 
 /* copies the changes of the triangle table since this frame was last filled, or all of it */
-static void copy_slots(const pal_body *body, pal_frame_part *to)
+static void copy_slots(const pal_shown *shown, const pal_body *body, pal_frame_part *to)
 {
     const pal_dofs *dofs = &body->dofs;
     size_t one = 3 * sizeof *to->slot;
     if (to->slot_log > dofs->n_log || dofs->n_log - to->slot_log > (uint64_t)dofs->n_log_room) {
         memcpy(to->slot, dofs->slot, one * (size_t)dofs->n_slot);
+        for (int i = 0; i < dofs->n_slot && shown->copy_start; i++)
+            pal_shown_copies_slot(shown, i, to->slot + 3 * (size_t)i, to->slot + 3 * (size_t)i);
     } else {
         for (uint64_t i = to->slot_log; i < dofs->n_log; i++) {
-            size_t at = 3 * (size_t)dofs->log[i % (uint64_t)dofs->n_log_room];
+            const int32_t slot = dofs->log[i % (uint64_t)dofs->n_log_room];
+            const size_t at = 3 * (size_t)slot;
             memcpy(to->slot + at, dofs->slot + at, one);
+            if (shown->copy_start) pal_shown_copies_slot(shown, slot, to->slot + at, to->slot + at);
         }
     }
     to->slot_log = dofs->n_log;
@@ -49,9 +63,20 @@ static void copy_slots(const pal_body *body, pal_frame_part *to)
     to->n_spring = dofs->n_spring;
 }
 
-static void copy_part(const pal_body *body, pal_frame_part *to)
+static void copy_positions(const pal_body *body, int n, float *to)
 {
-    copy_fields(body, to);
+    const double *o = body->offset_m;
+    if (o[0] == 0 && o[1] == 0 && o[2] == 0) {
+        if (n > 0) memcpy(to, body->display.shown, 3 * sizeof *to * (size_t)n);
+        return;
+    }
+    for (int i = 0; i < n; i++)
+        for (int c = 0; c < 3; c++) to[3 * i + c] = (float)(body->display.shown[3 * i + c] + o[c]);
+}
+
+static void copy_part(const pal_shown *shown, const pal_body *body, pal_frame_part *to)
+{
+    copy_fields(shown, body, to);
     const double *o = body->offset_m;
     to->revision = body->display.revision;
     to->frozen = body->frozen;
@@ -62,20 +87,15 @@ static void copy_part(const pal_body *body, pal_frame_part *to)
     to->n_output = body->display.n_output;
     if (to->n_point > 0) memcpy(to->point_m, body->x, 3 * sizeof(double) * (size_t)to->n_point);
     if (to->n_slot > 0) {
-        copy_slots(body, to);
+        copy_slots(shown, body, to);
         for (int k = 0; k < body->n_active && !same; k++) {
             size_t i = 3 * (size_t)body->active[k];
             for (size_t c = 0; c < 3; c++) to->position_m[i + c] = (float)((double)body->display.shown[i + c] + o[c]);
         }
-        return;
+    } else if (!same) {
+        copy_positions(body, shown->n_own, to->position_m);
     }
-    if (same) return;
-    if (o[0] == 0 && o[1] == 0 && o[2] == 0) {
-        if (to->n_vertex > 0) memcpy(to->position_m, body->display.shown, 3 * sizeof(float) * (size_t)to->n_vertex);
-        return;
-    }
-    for (int i = 0; i < to->n_vertex; i++)
-        for (int c = 0; c < 3; c++) to->position_m[3 * i + c] = (float)(body->display.shown[3 * i + c] + o[c]);
+    if (!same) fill_copies(shown, to->position_m, 3 * sizeof(float));
 }
 
 static void copy_tool(const pal_world *w, int t, pal_frame_tool *to)
@@ -107,7 +127,7 @@ void pal_world_frame(const pal_world *world, pal_frame *out)
     out->step_ns = w->step_ns;
     out->n_substep = w->n_substep;
     out->watched = !w->unobserved;
-    for (int b = 0; b < out->n_part; b++) copy_part(&w->plan.body[b], &out->part[b]);
+    for (int b = 0; b < out->n_part; b++) copy_part(&w->part[b], &w->plan.body[b], &out->part[b]);
     out->n_tool = w->tools.n_tool;
     for (int t = 0; t < w->tools.n_tool; t++) copy_tool(w, t, &out->tool[t]);
     out->n_row = w->plan.n_component < PAL_FRAME_COMPONENT_MAX ? w->plan.n_component : PAL_FRAME_COMPONENT_MAX;

@@ -21,6 +21,58 @@ static void deleting_the_heart_leaves_a_cavity_and_a_row_a_hole(void)
     pal_cells_free(&c);
 }
 
+/* boundary faces that were not on the boundary of the first complex */
+static int n_inside(const pal_cells *c)
+{
+    int n = 0;
+    for (int32_t f = 0; f < c->n_face; f++) n += pal_cells_face_boundary(c, f) && c->face[f].inside;
+    return n;
+}
+
+static pal_cells without_a_corner(void)
+{
+    return edited(solid_block(3, 3, 3), (pal_cells_command){.kind = PAL_CELLS_DELETE, .cell = 0});
+}
+
+/* 54 faces of a block are outside, whatever happens to others; what an edit opens or makes is inside */
+static void faces_that_edits_open_or_make_are_inside(void)
+{
+    pal_cells c = solid_block(3, 3, 3);
+    CHECK_INT(n_inside(&c), 0);
+    pal_cells_free(&c);
+    c = without_a_corner();
+    CHECK_INT(c.n_boundary_face, 54);
+    CHECK_INT(n_inside(&c), 3);
+    /* the neighbour has one of the three, of which there are four parts then, and two outer ones */
+    c = edited(c, (pal_cells_command){.kind = PAL_CELLS_DIVIDE, .cell = cell_near(&c, 0, -1, -1)});
+    CHECK_INT(c.n_boundary_face, 54 + 3 * 3);
+    CHECK_INT(n_inside(&c), 3 + 3);
+    pal_cells_free(&c);
+    /* dividing and sharpening open nothing */
+    c = edited(solid_block(3, 3, 3), (pal_cells_command){.kind = PAL_CELLS_DIVIDE, .cell = 0});
+    CHECK_INT(n_inside(&c), 0);
+    c = edited(c, (pal_cells_command){.kind = PAL_CELLS_SHARPEN_FACE, .face = 0, .sharp = 2});
+    CHECK_INT(n_inside(&c), 0);
+    /* and one of the parts leaves three */
+    c = edited(c, (pal_cells_command){.kind = PAL_CELLS_DELETE, .cell = cell_near(&c, -9, -9, -9)});
+    CHECK_INT(n_inside(&c), 3);
+    pal_cells_free(&c);
+    /* sides and end of a cell that grows, and of one between two faces */
+    c = solid_block(3, 3, 3);
+    c = edited(
+        c, (pal_cells_command){.kind = PAL_CELLS_EXTRUDE, .face = face_near(&c, 0, 0, 9), .distance_m = 1, .scale = 1});
+    CHECK_INT(c.n_boundary_face, 53 + 5);
+    CHECK_INT(n_inside(&c), 5);
+    pal_cells_free(&c);
+    c = edited(solid_block(3, 1, 1), (pal_cells_command){.kind = PAL_CELLS_DELETE, .cell = 1});
+    CHECK_INT(n_inside(&c), 2);
+    c = edited(c, (pal_cells_command){.kind = PAL_CELLS_BRIDGE,
+                                      .face = face_near(&c, -0.5, 0, 0),
+                                      .other_face = face_near(&c, 0.5, 0, 0)});
+    CHECK_INT(n_inside(&c), 4);
+    pal_cells_free(&c);
+}
+
 static void what_is_left_after_a_deletion_knows_where_it_comes_from(void)
 {
     pal_cells c = solid_block(3, 1, 1);
@@ -356,6 +408,7 @@ int main(void)
 {
     tabulate_slopes();
     RUN(deleting_the_heart_leaves_a_cavity_and_a_row_a_hole);
+    RUN(faces_that_edits_open_or_make_are_inside);
     RUN(what_is_left_after_a_deletion_knows_where_it_comes_from);
     RUN(an_extruded_cube_has_twice_the_volume_and_grows_on);
     RUN(an_extrusion_is_scaled_about_the_middle_of_its_face);

@@ -128,8 +128,30 @@ static void a_material_names_its_image(void)
     CHECK_INT(pal_material_image("m.mtl", (const uint8_t *)name, strlen(name), "", image, NULL), PAL_ERR_REFUSED);
 }
 
+/* 8192 x 8192 pixels in all are the most of one image and of several */
+static void the_images_of_a_body_are_limited_together(void)
+{
+    const pal_image one = {.n_byte = PAL_IMAGE_MAX_BYTE, .width = 8192, .height = 8192};
+    const pal_image half[3] = {{.n_byte = 8 << 20, .width = 8192, .height = 4096},
+                               {.n_byte = 8 << 20, .width = 4096, .height = 8192},
+                               {.n_byte = 1, .width = 1, .height = 1}};
+    pal_image many[PAL_IMAGES_MAX + 1] = {{0}};
+    pal_diagnostic diag = {""};
+    CHECK_INT(pal_images_check(&one, 1, &diag), 0);
+    CHECK_INT(pal_images_check(half, 2, &diag), 0);
+    CHECK_INT(pal_images_check(many, PAL_IMAGES_MAX, &diag), 0);
+    CHECK_INT(pal_images_check(half, 3, &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "3 images with together 16777217 bytes, those of a body have at most 16777216");
+    many[0] = one, many[1] = half[2], many[0].n_byte = 0;
+    CHECK_INT(pal_images_check(many, 2, &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "2 images with together 67108865 pixels, those of a body have at most 67108864");
+    CHECK_INT(pal_images_check(many, PAL_IMAGES_MAX + 1, &diag), PAL_ERR_REFUSED);
+    CHECK_TEXT(diag.text, "9 images, a body shows at most 8");
+}
+
 int main(void)
 {
+    RUN(the_images_of_a_body_are_limited_together);
     RUN(png_and_jpeg_give_their_size);
     RUN(other_images_have_their_sentence);
     RUN(a_material_names_its_image);

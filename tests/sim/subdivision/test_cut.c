@@ -1,8 +1,10 @@
 /* Solids that are cut away (pal_body_def.cut): motion is the same to the bit, the cut has its plane, its colours and
  * its inner nodes. */
 #include "server/base/vec3.h"
+#include "server/mesh/cells/cell_edits.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/subdivision/subdivision_solid.h"
+#include "server/sim/world/frame.h"
 #include "server/sim/world/world.h"
 #include "tests/fixtures/solids.h"
 
@@ -130,8 +132,83 @@ static void fields_colour_the_cut(void)
     clay_close(&c);
 }
 
+/* triangles of each look, all corners of a triangle having the same, and copies at the places of what they copy */
+static void count_looks(const clay *c, pal_shown *shown, int n[2])
+{
+    pal_world_shown(c->world, 0, shown);
+    n[0] = n[1] = 0;
+    for (int t = 0; t < shown->n_tri; t++) {
+        const int32_t *tri = shown->tri + 3 * t;
+        const int look = shown->look ? shown->look[tri[0]] : 0;
+        for (int k = 1; k < 3 && shown->look; k++) CHECK_INT(shown->look[tri[k]], look);
+        n[look]++;
+    }
+    for (int i = shown->n_own; i < shown->n_vertex; i++) {
+        const int32_t of = shown->copy_of[i - shown->n_own];
+        CHECK(!memcmp(shown->rest_m + 3 * i, shown->rest_m + 3 * of, 3 * sizeof(float)));
+    }
+}
+
+/* 4 x 4 x 4 cells, one level: a control face is 4 quads, 8 triangles, and a ring around n faces side by side is drawn
+ * twice. A cell in the middle of the top leaves 5 inner faces, whose mouth has 8 vertices */
+static void what_a_cut_or_an_edit_opens_is_inside(void)
+{
+    clay c;
+    pal_shown shown;
+    int n[2];
+    clay_make(&c);
+    REQUIRE(clay_start(&c));
+    count_looks(&c, &shown, n);
+    CHECK(!shown.look && !shown.copy_start);
+    CHECK_INT(n[0], 96 * 8);
+    clay_close(&c);
+
+    clay_make(&c);
+    cut_at(&c, 1, 0, 0, 0);
+    REQUIRE(clay_start(&c));
+    count_looks(&c, &shown, n);
+    CHECK_INT(n[0], (16 + 4 * 8) * 8);
+    CHECK_INT(n[1], 16 * 8);
+    CHECK_INT(shown.n_vertex - shown.n_own, 4 * 8);
+    clay_close(&c);
+
+    clay_make(&c);
+    const pal_cells_command remove = {.kind = PAL_CELLS_DELETE, .cell = 3 * 16 + 1 * 4 + 1};
+    pal_cells_edit edit;
+    pal_surface surface = {0};
+    REQUIRE(!pal_cells_apply(&c.cells, &remove, &edit, NULL));
+    pal_cells_free(&c.cells);
+    c.cells = edit.cells;
+    memset(&edit.cells, 0, sizeof edit.cells);
+    pal_cells_edit_free(&edit);
+    pal_prepared_free(&c.mesh);
+    REQUIRE(!pal_cells_boundary(&c.cells, &surface, NULL, NULL) && !pal_prepared_surface(&surface, &c.mesh));
+    pal_surface_free(&surface);
+    REQUIRE(clay_start(&c));
+    count_looks(&c, &shown, n);
+    CHECK_INT(n[0], 95 * 8);
+    CHECK_INT(n[1], 5 * 8);
+    CHECK_INT(shown.n_vertex - shown.n_own, 8);
+    pal_frame *frame = pal_frame_create(c.world);
+    REQUIRE(frame);
+    CHECK(!pal_world_load(c.world, 0, c.body->n_node / 2, (const double[3]){0.2, 0.1, -0.3}));
+    for (int i = 0; i < 6; i++) CHECK_INT(pal_world_step(c.world, 1.0 / 60), 0);
+    pal_world_frame(c.world, frame);
+    const float *x = frame->part[0].position_m;
+    double moved = 0;
+    for (int i = shown.n_own; i < shown.n_vertex; i++) {
+        const int32_t of = shown.copy_of[i - shown.n_own];
+        CHECK(!memcmp(x + 3 * i, x + 3 * of, 3 * sizeof *x));
+        moved = fmax(moved, fabsf(x[3 * i + 2] - shown.rest_m[3 * i + 2]));
+    }
+    CHECK(moved > 1e-6);
+    pal_frame_destroy(frame);
+    clay_close(&c);
+}
+
 int main(void)
 {
+    RUN(what_a_cut_or_an_edit_opens_is_inside);
     RUN(a_cut_changes_no_bit_of_what_moves);
     RUN(inner_nodes_are_shown_where_they_are);
     RUN(fields_colour_the_cut);
