@@ -14,6 +14,8 @@ _Static_assert((int)PAL_WIRE_FIELD_DISPLACEMENT_M == (int)PAL_FIELD_DISPLACEMENT
                    (int)PAL_WIRE_FIELD_STRAIN == (int)PAL_FIELD_STRAIN &&
                    (int)PAL_WIRE_FIELD_DISTORTION == (int)PAL_FIELD_DISTORTION &&
                    (int)PAL_WIRE_FIELD_YOUNG_PA == (int)PAL_FIELD_YOUNG_PA &&
+                   (int)PAL_WIRE_FIELD_DENSITY_KG_M3 == (int)PAL_FIELD_DENSITY_KG_M3 &&
+                   (int)PAL_WIRE_FIELD_DAMPING_1_S == (int)PAL_FIELD_DAMPING_1_S &&
                    (int)PAL_WIRE_FIELD_COUNT == (int)PAL_FIELD_COUNT,
                "fields are numbered alike");
 

@@ -44,6 +44,8 @@ export const FIELDS = Object.freeze({
         ],
     },
     young: { min: 0, units: PRESSURES },
+    density: { min: 0, units: [["kg/m³", 1]] },
+    damping: { min: 0, units: [["1/s", 1]] },
     strain: { min: 5e-3, units: PERCENT },
     distortion: { min: 5e-3, units: PERCENT, signed: true },
 });

@@ -125,6 +125,8 @@ export const GERMAN = {
     "effect.required": "{name}, verlangt von {reason}",
     "field.choice": "Farben",
     "field.choice.tip": "Was die Farben zeigen (C)",
+    "field.damping": "Dämpfung",
+    "field.density": "Dichte",
     "field.displacement": "Verschiebung",
     "field.distortion": "Volumenänderung",
     "field.energy": "Verzerrungsenergiedichte",

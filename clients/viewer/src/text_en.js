@@ -124,6 +124,8 @@ export const ENGLISH = {
     "effect.required": "{name}, required by {reason}",
     "field.choice": "Colour by",
     "field.choice.tip": "What the colours show (C)",
+    "field.damping": "Damping",
+    "field.density": "Density",
     "field.displacement": "Displacement",
     "field.distortion": "Volume change",
     "field.energy": "Strain energy density",

@@ -157,6 +157,7 @@ static void measure(void *self, const pal_body *body, pal_field field, double *s
 {
     const edge_distance *e = self;
     if (field == PAL_FIELD_STRAIN || field == PAL_FIELD_DISTORTION) measure_tets(body, field, sum, volume_m3);
+    if (field == PAL_FIELD_DENSITY_KG_M3) pal_body_measure_density(body, sum, volume_m3);
     if (field != PAL_FIELD_STIFFNESS_J) return;
     if (e->set.whole) {
         measure_regions(&e->set, sum, volume_m3);
@@ -168,12 +169,13 @@ static void measure(void *self, const pal_body *body, pal_field field, double *s
     }
 }
 
-const pal_effect pal_effect_edge_distance = {
-    PAL_EFFECT("edge_distance", FORCE),
-    .destroy = spring_destroy,
-    .internal = true,
-    .energy = energy,
-    .bounds = {.stiffness = stiffness, .damping = damping},
-    .material = pal_spring_set_material,
-    .inspect = {.measure = measure,
-                .fields = 1u << PAL_FIELD_STIFFNESS_J | 1u << PAL_FIELD_STRAIN | 1u << PAL_FIELD_DISTORTION}};
+const pal_effect pal_effect_edge_distance = {PAL_EFFECT("edge_distance", FORCE),
+                                             .destroy = spring_destroy,
+                                             .internal = true,
+                                             .energy = energy,
+                                             .bounds = {.stiffness = stiffness, .damping = damping},
+                                             .material = pal_spring_set_material,
+                                             .inspect = {.measure = measure,
+                                                         .fields = 1u << PAL_FIELD_STIFFNESS_J |
+                                                                   1u << PAL_FIELD_STRAIN | 1u << PAL_FIELD_DISTORTION |
+                                                                   1u << PAL_FIELD_DENSITY_KG_M3}};
