@@ -91,6 +91,7 @@ sculpt.onChange = () => {
 sculpt.nameOf = (/** @type {number} */ part) => state.parts[part]?.name ?? "";
 input.onClick = (/** @type {import("./tool_input.js").Hit} */ hit) => sculpt.click(hit);
 input.onHover = (/** @type {import("./tool_input.js").Hit | null} */ hit) => highlight.hover(hit);
+input.handles = () => inside.handles;
 input.onFirstDrag = () => htmlById("hint").classList.add("gone");
 const views = new ViewModes(
     stage,

@@ -92,12 +92,16 @@ export class Section {
 
     /** planes as the user has chosen them @returns {import("./slice.js").Plane[]} */
     chosen() {
+        return this.inside.planes.flatMap((_, i) => this.where(i) ?? []);
+    }
+
+    /** a plane as the user has chosen it; null: it is off @param {number} i @returns {import("./slice.js").Plane | null} */
+    where(i) {
         const { hello } = this.state;
-        if (!hello) return [];
+        if (!hello) return null;
         this.stage.placeCameras();
         const view = this.stage.camera.position.clone().sub(this.stage.target).normalize().toArray();
-        const box = [hello.box_min_m, hello.box_max_m];
-        return this.inside.planes.flatMap((plane) => planeOf(plane, box, view) ?? []);
+        return planeOf(this.inside.planes[i], [hello.box_min_m, hello.box_max_m], view);
     }
 
     /** before a picture */

@@ -190,6 +190,7 @@ export const GERMAN = {
     "hint.watching": "Sie sehen zu. Ziehen Sie, um sich umzusehen.",
     "inside.choose": "Für Werte im Inneren eine Farbe wählen.",
     "inside.direction.none": "Aus",
+    "inside.direction.turned": "Gedreht",
     "inside.direction.view": "Zu mir",
     "inside.direction.x": "Entlang x",
     "inside.direction.y": "Entlang y",

@@ -189,6 +189,7 @@ export const ENGLISH = {
     "hint.watching": "You are watching. Drag to look around.",
     "inside.choose": "Choose a colour to see values inside.",
     "inside.direction.none": "Off",
+    "inside.direction.turned": "Turned",
     "inside.direction.view": "Facing me",
     "inside.direction.x": "Along x",
     "inside.direction.y": "Along y",
