@@ -140,6 +140,7 @@ export class Section {
         this.cut.add(body);
         body.mesh.material.clippingPlanes = this.planes.length ? this.planes : null;
         body.mesh.material.clipIntersection = true;
+        body.mesh.material.clipShadows = true; // what is removed casts none
         body.mesh.material.needsUpdate = true;
     }
 
@@ -202,7 +203,12 @@ export class Section {
                 polygonOffsetUnits: 8,
             }),
         );
-        for (const { material } of [slice, fill]) material.clippingPlanes = beyond.length ? beyond : null;
+        const normals = new THREE.MeshNormalMaterial({ ...WHERE_OPEN, side: THREE.DoubleSide });
+        for (const material of [slice.material, fill.material, normals])
+            material.clippingPlanes = beyond.length ? beyond : null;
+        // for shadows and occlusion (picture_effects.js): a cap is as large as the body is open, which the stencil knows
+        Object.assign(fill.userData, { castsNone: true, normals });
+        for (const side of sides) side.userData.normals = side.material;
         // the next cap counts anew
         fill.onAfterRender = (renderer) => renderer.clearStencil();
         const group = new THREE.Group();
@@ -221,6 +227,7 @@ export class Section {
         if (!cap) return;
         this.stage.scene.remove(cap.group);
         for (const { material } of [...cap.sides, cap.slice, cap.fill]) material.dispose();
+        cap.fill.userData.normals.dispose();
         cap.slice.geometry.dispose();
         cap.fill.geometry.dispose();
         this.caps.delete(key);
