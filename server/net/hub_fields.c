@@ -31,6 +31,7 @@ bool pal_hub_subscribe_field(pal_client *c, const pal_wire_field_subscription *v
         return pal_hub_refuse(c, "field", "%s gives no %s with this method", s->part[part].info.name,
                               pal_field_title((pal_field)field));
     pal_hub_set_field(c, part, (pal_field)field, view->interior && s->part[part].n_node > 0);
+    pal_hub_set_energy(c, part, view->energy && pal_session_has_field(c->room->session, part, PAL_FIELD_ENERGY_J_M3));
     pal_hub_update_subscriptions(c->room);
     c->peer->ops->ready(c->peer); /* other clients may already subscribe to it */
     return true;

@@ -444,7 +444,7 @@ await run(async () => {
             "springs",
             prepare(),
             ["displacement", "stiffness"],
-            ["displacement", "stiffness", "density", "damping", "strain", "distortion"],
+            ["displacement", "energy", "stiffness", "density", "damping", "strain", "distortion"],
         );
     const fem = only === "springs" ? null : prepareFem();
     if (fem)

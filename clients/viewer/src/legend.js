@@ -154,6 +154,6 @@ export function offered(parts) {
 export function missing(parts) {
     const names = offered(parts);
     if (names.length === 0) return text("fields.none");
-    if (!names.includes("von_mises") || !names.includes("energy")) return text("fields.elements");
+    if (!names.includes("von_mises")) return text("fields.elements");
     return parts.some((part) => names.some((name) => !part.fields?.includes(name))) ? text("fields.some") : "";
 }

@@ -55,10 +55,11 @@ const char *pal_field_title(pal_field field); /* for sentences: "von Mises stres
 
 /* values of a field at the shown vertices, written by its component and valid while that exists */
 typedef struct pal_shown_field {
-    float *value;      /* SI                                    [n_shown] */
-    double *node;      /* the same at the nodes, NULL: not computed [n_node] */
-    uint64_t revision; /* different for every set of values               */
-    double time_s;     /* simulated time at which they were computed      */
+    float *value;                /* SI                                    [n_shown] */
+    double *node;                /* the same at the nodes, NULL: not computed [n_node] */
+    uint64_t revision;           /* different for every set of values               */
+    double time_s;               /* simulated time at which they were computed      */
+    double kinetic_J, elastic_J; /* of the body then; of the field energy only   */
 } pal_shown_field;
 
 /* who moves a dof: the solver, nobody, or a component that gives its velocity */

@@ -98,6 +98,11 @@ static void measured(field_output *out, const pal_step *step)
         const pal_effect *effect = step->force[i].effect;
         if (effect->inspect.measure) effect->inspect.measure(step->force[i].self, body, out->kind, sum, out->volume_m3);
     }
+    if (out->kind == PAL_FIELD_ENERGY_J_M3) {
+        out->shown.kinetic_J = pal_body_kinetic_J(body);
+        out->shown.elastic_J = 0;
+        for (int i = 0; i < body->n_node; i++) out->shown.elastic_J += sum[i];
+    }
     for (int i = 0; i < body->n_node; i++) sum[i] = out->volume_m3[i] > 0 ? sum[i] / out->volume_m3[i] : 0;
     spread(body, sum, out->shown.value);
 }

@@ -331,7 +331,7 @@ static void an_entry_of_the_scene_keeps_its_row(void)
         double rate_hz;
         const char *named;
     } bad[] = {
-        {"stress", 0, "\"stress\""}, {NULL, 0, "field"}, {"displacement", 1e9, "rate_hz"}, {"energy", 0, "energy"}};
+        {"stress", 0, "\"stress\""}, {NULL, 0, "field"}, {"displacement", 1e9, "rate_hz"}, {"von_mises", 0, "von Mises"}};
     tool_scene s;
     REQUIRE(slab_with(&s, "displacement", 30) && tool_scene_open(&s));
     int rows = pal_world_component_count(s.world);
@@ -692,6 +692,59 @@ static void painted_material_is_read_back(void)
     pal_cells_free(&cells);
 }
 
+/* The energies of a body, with its field energy: of a block in uniaxial tension that moves as a whole, E e^2 V / 2 and
+ * m v^2 / 2 */
+static void energies_are_those_of_a_stretched_block_that_moves(void)
+{
+    static const char *const element[] = {"tet4", "tet10", "hex8", "hex8_bbar"};
+    const double strain = 0.02, speed = 0.5;
+    for (int e = 0; e < 4; e++) {
+        tool_scene s;
+        double mass_kg = 0;
+        REQUIRE(stretched(&s, element[e], "linear", strain, 0));
+        for (int i = 0; i < s.body->n_dof; i++) {
+            s.body->v[3 * i] = 0.6 * speed, s.body->v[3 * i + 1] = 0.8 * speed, s.body->v[3 * i + 2] = 0;
+            mass_kg += s.body->mass_kg[i];
+        }
+        REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_ENERGY_J_M3, true, NULL));
+        const pal_shown_field *shown = s.body->display.field[PAL_FIELD_ENERGY_J_M3];
+        const pal_material *of = &s.scene->body[0].material;
+        const double volume_m3 = mass_kg / of->density_kg_m3;
+        CHECK_NEAR(volume_m3, 24e-6, 1e-12);
+        CHECK_NEAR(shown->elastic_J / (0.5 * of->young_Pa * strain * strain * volume_m3), 1, 1e-5);
+        CHECK_NEAR(shown->kinetic_J / (0.5 * mass_kg * speed * speed), 1, 1e-12);
+        pal_frame *frame = pal_frame_create(s.world);
+        REQUIRE(frame && !pal_frame_fit(frame, s.world));
+        pal_world_frame(s.world, frame);
+        CHECK_NEAR(frame->part[0].elastic_J, shown->elastic_J, 0);
+        CHECK_NEAR(frame->part[0].kinetic_J, shown->kinetic_J, 0);
+        pal_frame_destroy(frame);
+        close_fem(&s);
+    }
+}
+
+/* of springs: what the world's components give as energy, at rest 0 */
+static void energies_of_springs_are_those_of_their_components(void)
+{
+    tool_scene s;
+    REQUIRE(slab_scene(&s, 4, 3, 2, 0.01, 1, 0.01, 15));
+    s.scene->gravity_m_s2 = 0;
+    REQUIRE(tool_scene_open(&s));
+    REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_ENERGY_J_M3, true, NULL));
+    CHECK_LE(s.body->display.field[PAL_FIELD_ENERGY_J_M3]->elastic_J, 1e-12);
+    REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_ENERGY_J_M3, false, NULL));
+    for (int i = 0; i < s.body->n_dof; i++) {
+        const double *rest = s.body->x_rest + 3 * (size_t)i;
+        for (int c = 0; c < 3; c++) s.body->x[3 * i + c] = rest[c] * (c == 0 ? 1.05 : 0.98);
+        s.body->v[3 * i + 2] = 0.3;
+    }
+    REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_ENERGY_J_M3, true, NULL));
+    const pal_shown_field *shown = s.body->display.field[PAL_FIELD_ENERGY_J_M3];
+    CHECK(shown->elastic_J > 1e-6 && shown->kinetic_J > 1e-6);
+    CHECK_NEAR((shown->elastic_J + shown->kinetic_J) / pal_world_energy_J(s.world), 1, 1e-9);
+    tool_scene_close(&s);
+}
+
 /* rest, collapsed, flat, turned over, sheared */
 static void the_largest_strain_is_that_of_the_largest_stretch(void)
 {
@@ -753,6 +806,8 @@ int main(void)
     RUN(strain_and_distortion_of_a_solid_are_exact);
     RUN(density_is_that_of_the_regions);
     RUN(damping_is_the_rate_that_acts);
+    RUN(energies_are_those_of_a_stretched_block_that_moves);
+    RUN(energies_of_springs_are_those_of_their_components);
     RUN(painted_material_is_read_back);
     RUN(the_largest_strain_is_that_of_the_largest_stretch);
     RUN(looking_at_a_live_body_of_elements_changes_no_bit);
