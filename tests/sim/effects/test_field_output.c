@@ -330,8 +330,10 @@ static void an_entry_of_the_scene_keeps_its_row(void)
         const char *field;
         double rate_hz;
         const char *named;
-    } bad[] = {
-        {"stress", 0, "\"stress\""}, {NULL, 0, "field"}, {"displacement", 1e9, "rate_hz"}, {"von_mises", 0, "von Mises"}};
+    } bad[] = {{"stress", 0, "\"stress\""},
+               {NULL, 0, "field"},
+               {"displacement", 1e9, "rate_hz"},
+               {"von_mises", 0, "von Mises"}};
     tool_scene s;
     REQUIRE(slab_with(&s, "displacement", 30) && tool_scene_open(&s));
     int rows = pal_world_component_count(s.world);
