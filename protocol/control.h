@@ -168,6 +168,12 @@ typedef struct pal_wire_part_state {
     uint64_t n_safeguard;               /* steps in which a safeguard acted, total         */
     double safeguard_ms;                /* time of those safeguards, total                                           */
 } pal_wire_part_state;
+/* energy of a part, sent while the client asks for it (`energy` of subscribe_field) */
+typedef struct pal_wire_energy {
+    uint32_t part;
+    double time_s;               /* simulated time at which both were taken */
+    double kinetic_J, elastic_J; /* elastic: integral of the strain energy density */
+} pal_wire_energy;
 /* a disabled component that can be enabled */
 typedef struct pal_wire_disabled {
     char component[PAL_WIRE_NAME_BYTES];
@@ -213,6 +219,8 @@ typedef struct pal_wire_status {
     uint64_t n_unobserved; /* steps without observers     */
     uint32_t n_device;     /* 0: not on the wire          */
     pal_wire_device device[PAL_WIRE_TOOL_MAX];
+    uint32_t n_energy; /* 0: not on the wire          */
+    pal_wire_energy energy[PAL_WIRE_PART_MAX];
     uint32_t n_playback; /* 0: the session has no recording, and not on the wire */
     pal_wire_playback playback[1];
 } pal_wire_status;
@@ -331,6 +339,7 @@ typedef struct pal_wire_field_subscription {
     uint32_t part;
     char field[PAL_WIRE_FIELD_BYTES]; /* as in the part's list, or "none" */
     bool interior;                    /* INTERIOR messages too; where the part has none, there are none */
+    bool energy;                      /* energies of the part in `status`; where its model knows none, there are none */
 } pal_wire_field_subscription;
 
 typedef struct pal_control {

@@ -82,6 +82,11 @@ static const pal_control_field state_fields[] = {{"part", U32, true, ONE(part_st
                                                  {"safeguards", U64, false, ONE(part_state, n_safeguard)},
                                                  {"safeguard_ms", F64, false, ONE(part_state, safeguard_ms)},
                                                  {0}};
+static const pal_control_field energy_fields[] = {{"part", U32, true, ONE(energy, part)},
+                                                  {"time_s", F64, true, ONE(energy, time_s)},
+                                                  {"kinetic_J", F64, true, ONE(energy, kinetic_J)},
+                                                  {"elastic_J", F64, true, ONE(energy, elastic_J)},
+                                                  {0}};
 static const pal_control_field device_fields[] = {{"tool", U32, true, ONE(device, tool)},
                                                   {"force_error_N", F64, false, ONE(device, force_error_N)},
                                                   {"opening", F64, false, ONE(device, opening)},
@@ -116,6 +121,7 @@ static const pal_control_field STATUS_fields[] = {
     {"disabled", OBJECTS, false, LIST(status, disabled, n_disabled), off_fields},
     {"unobserved_steps", U64, false, ONE(status, n_unobserved)},
     {"devices", OBJECTS, false, LIST(status, device, n_device), device_fields},
+    {"energies", OBJECTS, false, LIST(status, energy, n_energy), energy_fields},
     {"playback", OBJECTS, false, LIST(status, playback, n_playback), playback_fields},
     {0}};
 static const pal_control_field member_fields[] = {
@@ -153,6 +159,7 @@ static const pal_control_field RELEASE_TOOL_fields[] = {{0}};
 static const pal_control_field SUBSCRIBE_FIELD_fields[] = {{"part", U32, true, ONE(field_subscription, part)},
                                                            {"field", TEXT, true, ONE(field_subscription, field)},
                                                            {"interior", BOOL, false, ONE(field_subscription, interior)},
+                                                           {"energy", BOOL, false, ONE(field_subscription, energy)},
                                                            {0}};
 static const pal_control_field ANSWER_fields[] = {{"verb", TEXT, true, ONE(answer, verb)},
                                                   {"text", TEXT, true, ONE(answer, text)},

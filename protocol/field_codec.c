@@ -10,8 +10,8 @@
 
 #define STAMP_MAX ((uint64_t)1 << 53)
 
-static const char *const name_of[PAL_WIRE_FIELD_COUNT] = {"none",      "displacement", "von_mises",  "energy",
-                                                          "stiffness", "strain",       "distortion", "young"};
+static const char *const name_of[PAL_WIRE_FIELD_COUNT] = {"none",   "displacement", "von_mises", "energy",  "stiffness",
+                                                          "strain", "distortion",   "young",     "density", "damping"};
 
 pal_wire_field pal_wire_field_find(const char *name)
 {

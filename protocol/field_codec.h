@@ -23,10 +23,12 @@ typedef enum pal_wire_field {
     PAL_WIRE_FIELD_STRAIN,
     PAL_WIRE_FIELD_DISTORTION,
     PAL_WIRE_FIELD_YOUNG_PA,
+    PAL_WIRE_FIELD_DENSITY_KG_M3,
+    PAL_WIRE_FIELD_DAMPING_1_S,
     PAL_WIRE_FIELD_COUNT
 } pal_wire_field;
 /* field of a name, as in `subscribe_field` and in parts: "none", "displacement", "von_mises", "energy", "stiffness",
- * "strain", "distortion", "young"; COUNT: unknown */
+ * "strain", "distortion", "young", "density", "damping"; COUNT: unknown */
 pal_wire_field pal_wire_field_find(const char *name);
 
 typedef struct pal_field_head {

@@ -280,7 +280,7 @@ int main(int argc, char **argv)
         {"--depth", "M", PAL_FLAG_NUMBER, &base.depth_m, 1e-5, 1, "depth of a press in metres (8 % of the box)"},
         {"--up", "X,Y,Z", PAL_FLAG_VECTOR, base.up, 0, 0, "from which side the organ is touched (0,0,1)"},
         {"--field", "NAME", PAL_FLAG_TEXT, &base.field, 0, 0,
-         "ask for displacement | von_mises | energy | stiffness | strain | distortion | young"},
+         "ask for displacement | von_mises | energy | stiffness | strain | distortion | young | density | damping"},
         {"--sculpt", "FILE", PAL_FLAG_TEXT, &sculpt, 0, 0,
          "give these orders: lines of SECONDS VERB key=value ... [at=top]"},
         {"--slow", "BYTES_S", PAL_FLAG_NUMBER, &base.read_bytes_s, 1, 1e9, "read no faster than this"},
@@ -300,10 +300,10 @@ int main(int argc, char **argv)
     if (!pal_unit3(base.up, base.up, 1e-9) || base.tool >= PAL_WIRE_TOOL_MAX)
         return pal_flags_wrong(&common, "--up wants a direction, --tool an index or any");
     if (base.field && (pal_wire_field_find(base.field) == PAL_WIRE_FIELD_COUNT || !strcmp(base.field, "none")))
-        return pal_flags_wrong(
-            &common,
-            "--field wants displacement, von_mises, energy, stiffness, strain, distortion or young, not \"%s\"",
-            base.field);
+        return pal_flags_wrong(&common,
+                               "--field wants displacement, von_mises, energy, stiffness, strain, distortion, young, "
+                               "density or damping, not \"%s\"",
+                               base.field);
     pal_orders orders = {.n_line = 0};
     pal_end_condition seen = {.any = false};
     const int bad = main_read(&common, sculpt, &orders, until, &seen);

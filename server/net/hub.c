@@ -77,6 +77,11 @@ static pal_packet *status_message(pal_client *c)
                 w->active[w->n_active++] =
                     (pal_wire_active){(uint32_t)p, (uint32_t)f->part[p].n_active, (uint32_t)f->part[p].n_spring,
                                       (uint32_t)f->part[p].n_finest, (uint32_t)f->part[p].n_finest_spring};
+        for (int p = 0; p < s->n_part; p++)
+            if (c->energy[p] && f->part[p].field[PAL_FIELD_ENERGY_J_M3].revision > 0)
+                w->energy[w->n_energy++] =
+                    (pal_wire_energy){(uint32_t)p, f->part[p].field[PAL_FIELD_ENERGY_J_M3].time_s, f->part[p].kinetic_J,
+                                      f->part[p].elastic_J};
         pal_hub_playback_status(c->room, w);
         w->n_device = (uint32_t)pal_stream_devices(s, c->room->tool, w->device);
         w->n_late = f->n_late;

@@ -76,6 +76,7 @@ typedef struct pal_client {
     uint32_t sent_change[PAL_BODY_MAX]; /* last triangle change sent, per part (pal_triangle_slots.change) */
     uint8_t view[PAL_BODY_MAX];         /* subscribed pal_field, per part */
     bool interior[PAL_BODY_MAX];        /* with the values inside */
+    bool energy[PAL_BODY_MAX];          /* subscribed to its energies in the status */
     uint64_t sent_field[PAL_BODY_MAX], sent_interior[PAL_BODY_MAX]; /* numbers of the last values sent */
     bool estimate[PAL_BODY_MAX], estimate_due[PAL_BODY_MAX];        /* subscribed; due */
     /* statistics */

@@ -14,6 +14,8 @@ _Static_assert((int)PAL_WIRE_FIELD_DISPLACEMENT_M == (int)PAL_FIELD_DISPLACEMENT
                    (int)PAL_WIRE_FIELD_STRAIN == (int)PAL_FIELD_STRAIN &&
                    (int)PAL_WIRE_FIELD_DISTORTION == (int)PAL_FIELD_DISTORTION &&
                    (int)PAL_WIRE_FIELD_YOUNG_PA == (int)PAL_FIELD_YOUNG_PA &&
+                   (int)PAL_WIRE_FIELD_DENSITY_KG_M3 == (int)PAL_FIELD_DENSITY_KG_M3 &&
+                   (int)PAL_WIRE_FIELD_DAMPING_1_S == (int)PAL_FIELD_DAMPING_1_S &&
                    (int)PAL_WIRE_FIELD_COUNT == (int)PAL_FIELD_COUNT,
                "fields are numbered alike");
 
@@ -29,6 +31,7 @@ bool pal_hub_subscribe_field(pal_client *c, const pal_wire_field_subscription *v
         return pal_hub_refuse(c, "field", "%s gives no %s with this method", s->part[part].info.name,
                               pal_field_title((pal_field)field));
     pal_hub_set_field(c, part, (pal_field)field, view->interior && s->part[part].n_node > 0);
+    pal_hub_set_energy(c, part, view->energy && pal_session_has_field(c->room->session, part, PAL_FIELD_ENERGY_J_M3));
     pal_hub_update_subscriptions(c->room);
     c->peer->ops->ready(c->peer); /* other clients may already subscribe to it */
     return true;

@@ -34,8 +34,10 @@ void pal_hub_update_subscriptions(pal_hub_room *room)
         request(room->session, room->n_estimate[b] > 0, &room->estimate_requested[b],
                 (pal_command){.kind = PAL_COMMAND_ESTIMATE, .body = b});
         for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++)
-            request(room->session, room->subscribers.n_field[b][k] > 0, &room->reported[b][k],
-                    (pal_command){.kind = PAL_COMMAND_FIELD, .body = b, .field = (pal_field)k});
+            request(room->session,
+                    room->subscribers.n_field[b][k] > 0 ||
+                        (k == PAL_FIELD_ENERGY_J_M3 && room->subscribers.n_energy[b] > 0),
+                    &room->reported[b][k], (pal_command){.kind = PAL_COMMAND_FIELD, .body = b, .field = (pal_field)k});
     }
 }
 
@@ -54,6 +56,12 @@ void pal_hub_set_field(pal_client *c, int part, pal_field field, bool interior)
     c->interior[part] = interior;
 }
 
+void pal_hub_set_energy(pal_client *c, int part, bool wanted)
+{
+    c->room->subscribers.n_energy[part] += wanted - c->energy[part];
+    c->energy[part] = wanted;
+}
+
 void pal_hub_set_estimate(pal_client *c, int body, bool wanted)
 {
     if (c->estimate[body] == wanted) return;
@@ -66,6 +74,7 @@ static void unsubscribe_all(pal_client *c)
 {
     for (int b = 0; b < c->room->stream->n_part; b++) {
         pal_hub_set_field(c, b, PAL_FIELD_NONE, false);
+        pal_hub_set_energy(c, b, false);
         pal_hub_set_estimate(c, b, false);
     }
     pal_hub_update_subscriptions(c->room);

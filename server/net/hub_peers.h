@@ -13,6 +13,7 @@ bool pal_hub_refuse(pal_client *client, const char *code, const char *format, ..
     __attribute__((format(printf, 3, 4)));
 /* field NONE: ends the subscription for this part; interior: with the values inside */
 void pal_hub_set_field(pal_client *client, int part, pal_field field, bool interior);
+void pal_hub_set_energy(pal_client *client, int part, bool wanted);
 void pal_hub_set_estimate(pal_client *client, int body, bool wanted);
 /* requests subscribed data from the session; retried at the next tick when its queue is full */
 void pal_hub_update_subscriptions(pal_hub_room *room);

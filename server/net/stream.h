@@ -107,6 +107,7 @@ bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_
 /* clients subscribed to a field, and those of them that take its interior */
 typedef struct pal_stream_subscribers {
     int n_field[PAL_BODY_MAX][PAL_FIELD_COUNT], n_interior[PAL_BODY_MAX][PAL_FIELD_COUNT];
+    int n_energy[PAL_BODY_MAX]; /* clients that take its energies: of the field energy, without its values */
 } pal_stream_subscribers;
 /* Encodes the newest values that have subscribers and drops the others. true: new values; *due_ns: time of the next
  * call for values that came too early, 0: none. */

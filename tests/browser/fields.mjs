@@ -94,6 +94,142 @@ const insideNow = (page) =>
         };
     });
 
+/**
+ * The first plane and its handle. arrow: a pixel on it that no other part of the handle covers; ahead: the pixel of the
+ * point that is so many m further along the normal; metre: pixels of a metre there, along the normal
+ */
+const handleNow = (page, forward = 0) =>
+    page.evaluate((m) => {
+        const { inside, stage, input, state } = window.palpate;
+        const plane = inside.section?.where(0);
+        const handle = inside.handles?.handles[0];
+        if (!plane || !handle?.arrow.object) return null;
+        const along = inside.handles.along(0);
+        const { anchor, arrow } = handle;
+        const on = (d) => {
+            const { x, y } = stage.project(anchor.position.clone().addScaledVector(along, d));
+            return { x, y };
+        };
+        const picks = (control, at) => inside.handles.hover({ clientX: at.x, clientY: at.y }) === control;
+        const start = [0.02, 0.025, 0.03, 0.035, 0.015, 0.01].find((d) => picks(arrow, on(d)));
+        const base = on(start ?? 0);
+        const next = on((start ?? 0) + 0.001);
+        return {
+            offset: plane.normal.reduce((sum, n, c) => sum + n * along.toArray()[c], 0) * -plane.constant,
+            along: along.toArray(),
+            arrow: start === undefined ? null : base,
+            ahead: on((start ?? 0) + m),
+            metre: 1000 * Math.hypot(next.x - base.x, next.y - base.y),
+            target: state.target,
+            dragging: input.drag !== null,
+            slider: Number(document.querySelector("#inside-planes input").value),
+            direction: document.querySelector("#inside-planes select").value,
+            box: [state.hello.box_min_m, state.hello.box_max_m],
+            view: [stage.free.azimuth, stage.free.elevation],
+        };
+    }, forward);
+/** a place on a ring of the first plane's handle, where nothing else of it is in front; null: none */
+const ringPixel = (page) =>
+    page.evaluate(() => {
+        const { inside, stage } = window.palpate;
+        const { anchor, rings } = inside.handles.handles[0];
+        const at = stage.project(anchor.position);
+        for (let r = 20; r < 120; r += 4)
+            for (let a = 0; a < 6.28; a += 0.2) {
+                const x = at.x + r * Math.cos(a);
+                const y = at.y + r * Math.sin(a);
+                if (document.elementFromPoint(x, y)?.id !== "view") continue;
+                if (inside.handles.hover({ clientX: x, clientY: y }) === rings) return { x, y };
+            }
+        return null;
+    });
+/** a touch of one finger that moves from one pixel to another */
+async function swipe(page, from, to, steps) {
+    const device = await page.context().newCDPSession(page);
+    const send = (type, points) => device.send("Input.dispatchTouchEvent", { type, touchPoints: points });
+    await send("touchStart", [from]);
+    for (let i = 1; i <= steps; i++)
+        await send("touchMove", [
+            { x: from.x + ((to.x - from.x) * i) / steps, y: from.y + ((to.y - from.y) * i) / steps },
+        ]);
+    await send("touchEnd", []);
+    await device.detach();
+}
+
+/** planes moved and turned by their handles */
+async function checkHandles(name, address) {
+    const browser = await launch();
+    const page = await open(browser, address, "Eve", { width: 900, height: 600 });
+    await page.keyboard.press("i");
+    await setPlane(page, 0, "x", 0.5);
+    await until(() => handleNow(page));
+    const forward = 0.02;
+    for (const device of ["mouse", "touch"]) {
+        await drawn(page);
+        const before = await handleNow(page, device === "mouse" ? forward : -forward);
+        check(`${name}: the plane has an arrow that can be dragged (${device})`, before.arrow !== null);
+        let held = null;
+        if (device === "mouse") {
+            await page.mouse.move(before.arrow.x, before.arrow.y);
+            await page.mouse.down();
+            const [dx, dy] = [(before.ahead.x - before.arrow.x) / 5, (before.ahead.y - before.arrow.y) / 5];
+            await drag(page, before.arrow, dx, dy, 5);
+            held = await handleNow(page);
+            await page.screenshot({ path: join(pictures, `handles_${name}.png`) });
+            await page.mouse.up();
+        } else await swipe(page, before.arrow, before.ahead, 5);
+        const after = await handleNow(page);
+        const moved = after.offset - before.offset;
+        const wanted = device === "mouse" ? forward : -forward;
+        check(
+            `${name}: dragged by ${device}, its offset changes by the way along the normal, to a pixel`,
+            Math.abs(moved - wanted) * before.metre <= 1,
+            `${(1e3 * moved).toFixed(3)} of ${1e3 * wanted} mm, ${(Math.abs(moved - wanted) * before.metre).toFixed(2)} px`,
+        );
+        const [low, high] = before.box;
+        const at = (after.offset - low[0]) / (high[0] - low[0]);
+        check(
+            `${name}: the slider stands where the plane is (${device})`,
+            Math.abs(at - after.slider) <= 0.0011, // half of its step
+            `${at.toFixed(4)} and ${after.slider}`,
+        );
+        check(
+            `${name}: nothing is grasped, and the view stays (${device})`,
+            !held?.dragging && !held?.target && !after.target && `${after.view}` === `${before.view}`,
+        );
+    }
+    await drawn(page);
+    const ring = await ringPixel(page);
+    const before = await handleNow(page);
+    check(`${name}: the plane has rings`, ring !== null);
+    await page.mouse.move(ring.x, ring.y);
+    await page.mouse.down();
+    await drag(page, ring, 6, 4, 5);
+    await page.mouse.up();
+    await drawn(page);
+    await page.screenshot({ path: join(pictures, `handles_${name}_turned.png`) });
+    const after = await handleNow(page);
+    const cos = after.along.reduce((sum, a, c) => sum + a * before.along[c], 0);
+    const degrees = (180 / Math.PI) * Math.acos(Math.min(1, cos));
+    check(
+        `${name}: a ring turns it`,
+        after.direction === "turned" && degrees > 5 && degrees < 90 && !after.target,
+        `${degrees.toFixed(1)} degrees`,
+    );
+    await setPlane(page, 0, "turned", 0.75);
+    const moved = await handleNow(page);
+    const kept = moved.along.reduce((sum, a, c) => sum + a * after.along[c], 0);
+    check(
+        `${name}: the slider moves a turned plane along its normal`,
+        kept > 1 - 1e-9 && moved.offset > after.offset,
+        `${(1e3 * after.offset).toFixed(1)} -> ${(1e3 * moved.offset).toFixed(1)} mm`,
+    );
+    await page.keyboard.press("i");
+    await drawn(page);
+    check(`${name}: a closed panel has no handles`, (await handleNow(page)) === null);
+    await browser.close();
+}
+
 /** sections of a body that is being pulled, with its displacement inside */
 async function checkInside(page, name) {
     // the mouse pulls: buttons are pressed by the page, and a slow machine may not let go meanwhile
@@ -162,7 +298,9 @@ async function checkInside(page, name) {
 async function checkFields(name, scene, wanted, offered = wanted) {
     const server = await serve(scene, 0);
     const browser = await launch();
-    const page = await open(browser, `http://127.0.0.1:${server.info.port}/`, "Ada", { width: 900, height: 600 });
+    const address = `http://127.0.0.1:${server.info.port}/`;
+    await checkHandles(name, address);
+    const page = await open(browser, address, "Ada", { width: 900, height: 600 });
     let f = await figures(page);
     check(
         `${name}: the fields of the model are offered`,
@@ -306,7 +444,7 @@ await run(async () => {
             "springs",
             prepare(),
             ["displacement", "stiffness"],
-            ["displacement", "stiffness", "strain", "distortion"],
+            ["displacement", "energy", "stiffness", "density", "damping", "strain", "distortion"],
         );
     const fem = only === "springs" ? null : prepareFem();
     if (fem)
@@ -314,7 +452,7 @@ await run(async () => {
             "fem",
             fem,
             ["displacement", "von_mises", "energy", "distortion"],
-            ["displacement", "von_mises", "energy", "young", "strain", "distortion"],
+            ["displacement", "von_mises", "energy", "young", "density", "damping", "strain", "distortion"],
         );
     checkConsoles();
 });

@@ -66,6 +66,13 @@ async function openPage(browser, port, query) {
             const row = height - 1 - Math.min(height - 1, Math.floor((y / canvas.clientHeight) * height));
             return [...pixels.subarray(4 * (row * width + column), 4 * (row * width + column) + 3)];
         };
+        /** share of the pixels that differ visibly */
+        window.differing = (a, b) => {
+            let n = 0;
+            for (let i = 0; i < a.pixels.length; i += 4)
+                n += [0, 1, 2].some((k) => Math.abs(a.pixels[i + k] - b.pixels[i + k]) > 6);
+            return (4 * n) / a.pixels.length;
+        };
         /** places of a grid that show a body: pixel, body, point */
         window.places = (step) => {
             const found = [];
@@ -194,6 +201,60 @@ const darkening = (page, names) =>
             .map(({ part, apart, light }, i) => ({ part, apart, ratio: light / without[i].light }))
             .filter(({ part }) => part < 2);
     }, names);
+/** a section that removes the body above is a picture without it; a cap is as bright as without effects */
+async function checkCut(page) {
+    const cutAt = (z) =>
+        page.evaluate(async (height) => {
+            const { inside, state } = window.palpate;
+            const [low, high] = [state.hello.box_min_m[2], state.hello.box_max_m[2]];
+            Object.assign(inside.planes[0], { direction: height === null ? "none" : "z" });
+            inside.planes[0].at = height === null ? 0.5 : (height - low) / (high - low);
+            await inside.changed();
+            inside.update();
+        }, z);
+    const difference = await page.evaluate(async () => {
+        const { effects } = window.palpate.stage;
+        const lamp = window.palpate.state.bodies.get(2);
+        effects.choice.on = new Set(["shadow", "occlusion"]);
+        effects.apply();
+        lamp.appear(false);
+        window.without = window.takePicture();
+        lamp.appear(true);
+        window.whole = window.takePicture();
+        return window.differing(window.without, window.whole);
+    });
+    await cutAt(0.045);
+    const left = await page.evaluate(() => window.differing(window.without, window.takePicture()));
+    await page.screenshot({ path: join(pictures, "look_cut_above.png") });
+    check(
+        "what a section removes casts no shadow and no occlusion",
+        difference > 0.1 && left < 0.002,
+        `${(100 * left).toFixed(2)} % of the pixels differ from those without the body, ${(100 * difference).toFixed(0)} % with it`,
+    );
+    await cutAt(0.01);
+    const share = await page.evaluate(() => {
+        const { effects, target } = window.palpate.stage;
+        const { occlusion } = effects;
+        const lights = (names) => {
+            effects.choice.on = new Set(names);
+            effects.apply();
+            const picture = window.takePicture();
+            const places = [-0.04, -0.02, 0, 0.02, 0.04].flatMap((x) => [-0.015, 0, 0.015].map((y) => [x, y, 0.01]));
+            return places.map((place) => {
+                const at = window.palpate.stage.project(target.clone().fromArray(place));
+                return window.colourAt(picture, at.x, at.y).reduce((sum, c) => sum + c, 0);
+            });
+        };
+        const before = lights([]);
+        effects.occlusion = occlusion;
+        const after = lights(["shadow", "occlusion"]);
+        return Math.min(...after.map((light, i) => light / before[i]));
+    });
+    await page.evaluate(() => window.takePicture());
+    await page.screenshot({ path: join(pictures, "look_cut_cap.png") });
+    check("a cap in the light is everywhere as bright as without effects", share > 0.97, share.toFixed(3));
+    await cutAt(null);
+}
 const mean = (values) => values.reduce((sum, v) => sum + v, 0) / values.length;
 
 await run(async () => {
@@ -251,6 +312,7 @@ await run(async () => {
     const dark = shade.filter((ratio) => ratio < 0.75).length / shade.length;
     const lit = shade.filter((ratio) => ratio > 0.97).length / shade.length;
     check("a body above casts its shadow", dark > 0.05 && lit > 0.3, `${dark.toFixed(2)} dark, ${lit.toFixed(2)} lit`);
+    await checkCut(full);
     const off = await full.evaluate(() => {
         const { effects, key, renderer } = window.palpate.stage;
         effects.choice.on.clear();

@@ -105,6 +105,43 @@ await run(async () => {
         (w) => w > 0.1,
         60000,
     );
+    const reach = await until(
+        () =>
+            ada.evaluate(() => {
+                const { plots, state } = window.palpate;
+                const { ring, last } = plots.panel.sampler;
+                const [body] = [...state.bodies.values()];
+                const [x, y, z] = last[state.ownTool].position;
+                let mm = Infinity;
+                for (let i = 0; i < body.rest.length; i += 3)
+                    mm = Math.min(mm, 1e3 * Math.hypot(body.rest[i] - x, body.rest[i + 1] - y, body.rest[i + 2] - z));
+                const [, depth] = [...ring.since(-Infinity).columns].find(([key]) => key.endsWith("depth_mm"));
+                return { mm, above: 1e3 * state.hello.tools[state.ownTool].radius_m - depth.at(-1) };
+            }),
+        ({ mm, above }) => Math.abs(above) < 1.01 * mm && Math.abs(above) > 0.85 * mm,
+        60000,
+    );
+    check(
+        "the depth is that of the tool along the normal of the nearest place at rest",
+        Math.abs(reach.above) < 1.01 * reach.mm && Math.abs(reach.above) > 0.85 * reach.mm,
+        `${reach.above.toFixed(1)} mm, nearest vertex at rest ${reach.mm.toFixed(1)} mm`,
+    );
+    const energy = await until(
+        () =>
+            ada.evaluate(() => {
+                const { panel } = window.palpate.plots;
+                const { plot } = panel.charts.find((c) => c.name === "energy_mJ");
+                const [, total, kinetic] = plot.data.map((column) => column.at(-1));
+                return { total, kinetic, components: window.palpate.state.running };
+            }),
+        ({ total }) => total > 0.1,
+        60000,
+    );
+    check(
+        "the pulled body has elastic energy, more than kinetic energy",
+        energy.total > 0.1 && energy.kinetic >= 0 && energy.kinetic < energy.total,
+        `${energy.total.toFixed(2)} mJ, ${energy.kinetic.toFixed(3)} mJ of it kinetic; ${mJ.toFixed(2)} mJ of work`,
+    );
     const ms = await newest(ada, "step_ms");
     check("pulling works on the tissue", mJ > 0.1, `${mJ.toFixed(2)} mJ`);
     check("a step takes time", ms > 0, `${ms.toFixed(2)} ms`);
@@ -163,7 +200,11 @@ await run(async () => {
         times.length === n && times.every((t, i) => i === 0 || t > times[i - 1]),
         `${csv.name}, ${times.length} rows from ${times[0]} to ${times.at(-1)} s`,
     );
-    check("its header has units", /^time_s,.*force_N Ada,displacement_mm Ada,work_mJ Ada/.test(lines[0]), lines[0]);
+    check(
+        "its header has units",
+        /^time_s,.*force_N Ada,displacement_mm Ada,depth_mm Ada,work_mJ Ada,energy_mJ/.test(lines[0]),
+        lines[0],
+    );
     const column = lines[0].split(",").indexOf("force_N Ada");
     const largestForce = Math.max(...lines.slice(1).map((line) => Number(line.split(",")[column])));
     check("it has the force that was plotted", largestForce >= pair.plot - 1e-6, `${largestForce} N`);

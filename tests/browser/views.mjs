@@ -96,6 +96,31 @@ async function endoscope(page) {
     ]);
     check("an endoscope has a round picture in a dark surround", corner < 12 && middle > 25, `${corner} ${middle}`);
     await page.screenshot({ path: join(pictures, "views_hint.png") });
+    const before = page.viewportSize();
+    for (const [width, height] of [
+        [1280, 720],
+        [900, 600],
+        [390, 844],
+    ]) {
+        await page.setViewportSize({ width, height });
+        const covered = await page.evaluate(() => {
+            const ids = ["notice", "view-hint", "force", "head", "state", "tools"];
+            const elements = ids.map((id) => document.getElementById(id));
+            const notice = elements[0];
+            const was = elements.map((element) => element.hidden);
+            for (const element of elements) element.hidden = false;
+            notice.textContent = "This browser draws 4 pictures a second. The simulation itself is not slower.";
+            const boxes = elements.map((element) => element.getBoundingClientRect());
+            elements.forEach((element, i) => (element.hidden = was[i]));
+            notice.textContent = "";
+            const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+            return ids.flatMap((id, i) =>
+                ids.filter((_, k) => k < i && meet(boxes[i], boxes[k])).map((other) => `${other} ${id}`),
+            );
+        });
+        check(`at ${width}x${height} notice, hint, force and title stand apart`, covered.length === 0, covered.join());
+    }
+    await page.setViewportSize(before);
     await page.evaluate(() => (document.getElementById("view-hint").hidden = true));
     await picture(page, "views_endoscope");
     const pixel = await organPixel(page);

@@ -292,7 +292,7 @@ static inline void golden_control(pal_control_type type, pal_control *c)
         c->tool = 2;
         break;
     case PAL_CONTROL_SUBSCRIBE_FIELD:
-        c->field_subscription = (pal_wire_field_subscription){1, "von_mises", false};
+        c->field_subscription = (pal_wire_field_subscription){1, "von_mises", false, false};
         break;
     case PAL_CONTROL_PING:
     case PAL_CONTROL_PONG:
@@ -325,6 +325,9 @@ static inline void golden_status(pal_wire_status *s)
     s->n_disabled = 1;
     s->disabled[0] = (pal_wire_disabled){"gravity", 1};
     s->n_unobserved = 123456789012;
+    s->n_energy = 2;
+    s->energy[0] = (pal_wire_energy){0, 12.3, 1.5e-5, 0.0032};
+    s->energy[1] = (pal_wire_energy){15, 12.25, 0, 2.5};
 }
 
 static inline void golden_line(int line, pal_control *c)

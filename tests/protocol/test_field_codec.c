@@ -141,8 +141,8 @@ static void decoder_refuses_bad_kinds_ranges_and_blocks(void)
 
 static void names_and_numbers_agree(void)
 {
-    static const char *const name[] = {"none",      "displacement", "von_mises",  "energy",
-                                       "stiffness", "strain",       "distortion", "young"};
+    static const char *const name[] = {"none",   "displacement", "von_mises", "energy",  "stiffness",
+                                       "strain", "distortion",   "young",     "density", "damping"};
     for (int f = 0; f < PAL_WIRE_FIELD_COUNT; f++) CHECK_INT(pal_wire_field_find(name[f]), f);
     CHECK_INT(pal_wire_field_find("stress"), PAL_WIRE_FIELD_COUNT);
     CHECK_INT(pal_wire_field_find(""), PAL_WIRE_FIELD_COUNT);

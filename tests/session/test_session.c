@@ -481,7 +481,8 @@ static void a_field_exists_while_somebody_subscribes(void)
     int n_component = f->n_row;
     CHECK(!shows_displacement(f));
     CHECK_INT(n_component, pal_session_view_outline(s)->n_component);
-    CHECK(pal_session_has_field(s, 0, PAL_FIELD_DISPLACEMENT_M) && !pal_session_has_field(s, 0, PAL_FIELD_ENERGY_J_M3));
+    CHECK(pal_session_has_field(s, 0, PAL_FIELD_DISPLACEMENT_M) &&
+          !pal_session_has_field(s, 0, PAL_FIELD_VON_MISES_PA));
     CHECK(!pal_session_has_field(s, 1, PAL_FIELD_DISPLACEMENT_M) &&
           !pal_session_has_field(s, -1, PAL_FIELD_DISPLACEMENT_M));
     CHECK_INT(subscribe(s, PAL_FIELD_DISPLACEMENT_M, true), 0);

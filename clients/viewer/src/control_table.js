@@ -106,6 +106,7 @@ export const SERVER_MESSAGES = Object.freeze(
             "disabled?": [{ component: "text", part: "u32" }],
             "unobserved_steps?": "u64",
             "devices?": [{ tool: "u32", "force_error_N?": "f64", "opening?": "f64" }],
+            "energies?": [{ part: "u32", time_s: "f64", kinetic_J: "f64", elastic_J: "f64" }],
             "playback?": [{ plays: "bool", time_s: "f64", length_s: "f64", speed: "f64", "ended?": "bool" }],
         },
         members: { members: [member], "locked_tools?": "numbers", "locked?": "bool" },
@@ -172,7 +173,7 @@ export const CLIENT_MESSAGES = Object.freeze(
         take_tool: { tool: "tool" },
         release_tool: {},
         ping: { stamp_ms: "f64" },
-        subscribe_field: { part: "u32", field: "text", "interior?": "bool" },
+        subscribe_field: { part: "u32", field: "text", "interior?": "bool", "energy?": "bool" },
     }),
 );
 

@@ -13,6 +13,8 @@ export const FIELD_NAMES = Object.freeze([
     "strain",
     "distortion",
     "young",
+    "density",
+    "damping",
 ]);
 
 const need = checkOf("field");

@@ -21,6 +21,7 @@ export class FieldDisplay {
         /** @type {import("./inside.js").Inside | null} set by itself */
         this.inside = null;
         this.interior = false; // are values inside wanted?
+        this.energy = false; // are energies wanted in the status?
         this.share = 0; // of the colours, see shareOf
         this.list = selectById("field");
         this.list.onchange = () => this.choose(this.list.value);
@@ -36,6 +37,7 @@ export class FieldDisplay {
                 part: i,
                 field,
                 ...(this.interior && part.interior && { interior: true }),
+                ...(this.energy && part.fields.includes("energy") && { energy: true }),
             });
         });
     }
@@ -45,6 +47,13 @@ export class FieldDisplay {
         if (wanted === this.interior) return;
         this.interior = wanted;
         if (this.state.field !== "none") this.subscribe();
+    }
+
+    /** @param {boolean} wanted energies of the bodies in the status */
+    setEnergy(wanted) {
+        if (wanted === this.energy) return;
+        this.energy = wanted;
+        this.subscribe();
     }
 
     /** @param {string} name of a field, or "none" */

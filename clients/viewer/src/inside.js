@@ -29,6 +29,10 @@ export class Inside {
         this.interiors = new Map();
         /** @type {import("./section.js").Section | null} null: never used */
         this.section = null;
+        /** @type {import("./plane_handles.js").PlaneHandles | null} null: never used */
+        this.handles = null;
+        /** @type {(() => void)[]} writes each plane into its row of the panel */
+        this.showPlane = [];
         /** @type {import("./volume.js").Volume | null} null: never used */
         this.cloud = null;
         this.volume = false; // is the field drawn as a cloud?
@@ -62,20 +66,22 @@ export class Inside {
                 direction.append(...names.map((name) => /** @type {HTMLOptionElement} */ (name.cloneNode(true))));
                 direction.ariaLabel = text("inside.plane", number);
                 at.ariaLabel = text("inside.position", number);
-                at.value = "0.5";
-                at.ariaValueText = percent(plane.at);
                 flip.ariaLabel = flip.title = text("inside.flip");
-                at.disabled = flip.disabled = true;
+                const show = () => {
+                    direction.options[DIRECTIONS.indexOf("turned")].hidden = !plane.turned;
+                    direction.value = plane.direction;
+                    at.value = String(plane.at);
+                    at.ariaValueText = percent(plane.at);
+                    at.disabled = flip.disabled = plane.direction === "none";
+                };
+                show();
+                this.showPlane.push(show);
                 direction.onchange = () => {
                     plane.direction = direction.value;
-                    at.disabled = flip.disabled = plane.direction === "none";
+                    show();
                     this.changed();
                 };
-                at.oninput = () => {
-                    plane.at = Number(at.value);
-                    at.ariaValueText = percent(plane.at);
-                    this.changed();
-                };
+                at.oninput = () => this.movePlane(i, Number(at.value));
                 flip.onclick = () => {
                     plane.flipped = !plane.flipped;
                     this.changed();
@@ -86,10 +92,24 @@ export class Inside {
         );
     }
 
+    /** @param {number} i plane @param {number} at */
+    movePlane(i, at) {
+        this.planes[i].at = at;
+        this.showPlane[i]();
+        this.changed();
+    }
+
+    /** @param {number} i plane @param {number[]} turned unit vector along which it lies at `at` @param {number} at */
+    turnPlane(i, turned, at) {
+        Object.assign(this.planes[i], { direction: "turned", turned });
+        this.movePlane(i, at);
+    }
+
     toggle() {
         const panel = htmlById("inside");
         panel.hidden = !panel.hidden;
         this.button.setAttribute("aria-expanded", String(!panel.hidden));
+        this.stage.dirty = true; // the handles come and go with the panel
     }
 
     /** are values inside looked at? */
@@ -102,8 +122,12 @@ export class Inside {
         this.fields.setInterior(this.wanted);
         if (!this.wanted) this.interiors.forEach((interior) => (interior.field = ""));
         if (this.wanted && !this.section) {
-            const { Section } = await import("./section.js");
+            const [{ Section }, { PlaneHandles }] = await Promise.all([
+                import("./section.js"),
+                import("./plane_handles.js"),
+            ]);
             this.section ??= new Section(this.stage, this.state, this);
+            this.handles ??= new PlaneHandles(this.stage, this);
         }
         if (this.volume && !this.cloud) {
             const { Volume } = await import("./volume.js");
@@ -130,6 +154,7 @@ export class Inside {
     update() {
         this.cloud?.update(this.section?.chosen() ?? []);
         this.section?.update();
+        this.handles?.update(!htmlById("inside").hidden);
     }
 
     /** @param {import("./interior_link.js").InteriorMesh} message */

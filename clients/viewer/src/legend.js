@@ -44,6 +44,8 @@ export const FIELDS = Object.freeze({
         ],
     },
     young: { min: 0, units: PRESSURES },
+    density: { min: 0, units: [["kg/m³", 1]] },
+    damping: { min: 0, units: [["1/s", 1]] },
     strain: { min: 5e-3, units: PERCENT },
     distortion: { min: 5e-3, units: PERCENT, signed: true },
 });
@@ -152,6 +154,6 @@ export function offered(parts) {
 export function missing(parts) {
     const names = offered(parts);
     if (names.length === 0) return text("fields.none");
-    if (!names.includes("von_mises") || !names.includes("energy")) return text("fields.elements");
+    if (!names.includes("von_mises")) return text("fields.elements");
     return parts.some((part) => names.some((name) => !part.fields?.includes(name))) ? text("fields.some") : "";
 }

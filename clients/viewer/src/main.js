@@ -67,7 +67,7 @@ const playback = new PlaybackBar(document, sendCommand);
 const others = new OtherTools();
 const orientation = new OrientationCube(document.body);
 const accuracy = new AccuracyPanel(document, sendCommand);
-const plots = new Plots(state);
+const plots = new Plots(state, fields);
 const cue = new ForceCue(stage, state);
 const capture = new Capture(stage, state);
 const sculpt = new SculptPanel(document, sendCommand, save);
@@ -91,6 +91,7 @@ sculpt.onChange = () => {
 sculpt.nameOf = (/** @type {number} */ part) => state.parts[part]?.name ?? "";
 input.onClick = (/** @type {import("./tool_input.js").Hit} */ hit) => sculpt.click(hit);
 input.onHover = (/** @type {import("./tool_input.js").Hit | null} */ hit) => highlight.hover(hit);
+input.handles = () => inside.handles;
 input.onFirstDrag = () => htmlById("hint").classList.add("gone");
 const views = new ViewModes(
     stage,

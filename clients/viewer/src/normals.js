@@ -32,3 +32,17 @@ export function vertexNormals(x, triangles, out, visible = null) {
         ((out[i] *= s), (out[i + 1] *= s), (out[i + 2] *= s));
     }
 }
+
+/**
+ * Unit normal of one vertex: of its triangles, by area; 0 of a vertex without.
+ * @param {Float32Array} x positions [n][3] @param {Uint32Array} triangles [m][3] @param {number} vertex
+ */
+export function normalAt(x, triangles, vertex) {
+    const own = [];
+    for (let t = 0; t < triangles.length; t += 3)
+        if (triangles[t] === vertex || triangles[t + 1] === vertex || triangles[t + 2] === vertex)
+            own.push(triangles[t], triangles[t + 1], triangles[t + 2]);
+    const normals = new Float32Array(x.length);
+    vertexNormals(x, Uint32Array.from(own), normals, Uint32Array.from(own));
+    return [...normals.subarray(3 * vertex, 3 * vertex + 3)];
+}

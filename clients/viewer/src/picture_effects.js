@@ -24,6 +24,11 @@ function isSolid(object) {
     return material instanceof THREE.MeshStandardMaterial && !material.transparent && material.depthTest;
 }
 
+/** drawn nowhere */
+const HIDDEN = new THREE.MeshBasicMaterial({ visible: false });
+
+/** @typedef {{castsNone?: boolean, normals?: THREE.Material}} EffectData of an object's userData, see section.js */
+
 /** shadows of the key light, over the whole scene */
 class Shadow {
     /** @param {import("./stage.js").Stage} stage */
@@ -58,7 +63,9 @@ class Shadow {
         key.shadow.normalBias = (2 * 2 * reach) / SHADOW_PIXELS;
         key.shadow.bias = -5e-4;
         scene.traverse((object) => {
-            if (isSolid(object)) object.castShadow = object.receiveShadow = true;
+            if (!isSolid(object)) return;
+            object.castShadow = !(/** @type {EffectData} */ (object.userData).castsNone);
+            object.receiveShadow = true;
         });
     }
 
@@ -77,7 +84,10 @@ const fetchAddons = () =>
         import("../vendor/addons/postprocessing/Pass.js"),
     ]);
 
-/** three's ambient occlusion, multiplied into the finished picture */
+/**
+ * three's ambient occlusion, multiplied into the finished picture. Normals and depths are drawn here: what a section
+ * removes occludes nothing, caps are the surface there, and marks and handles are none.
+ */
 class Occlusion {
     /**
      * @param {import("./stage.js").Stage} stage
@@ -88,6 +98,18 @@ class Occlusion {
         this.buffer = new THREE.Vector2();
         this.pass = new GTAOPass(stage.scene, stage.camera, 1, 1);
         this.pass.output = GTAOPass.OUTPUT.Off;
+        const depthTexture = new THREE.DepthTexture(1, 1, THREE.UnsignedInt248Type);
+        depthTexture.format = THREE.DepthStencilFormat;
+        this.surface = new THREE.WebGLRenderTarget(1, 1, {
+            minFilter: THREE.NearestFilter,
+            magFilter: THREE.NearestFilter,
+            type: THREE.HalfFloatType,
+            stencilBuffer: true, // caps of sections
+            depthTexture,
+        });
+        this.pass.setGBuffer(depthTexture, this.surface.texture);
+        /** @type {WeakMap<THREE.Material, THREE.MeshNormalMaterial>} by the material of the picture */
+        this.normals = new WeakMap();
         this.pass.updatePdMaterial({ lumaPhi: 10, normalPhi: 3, radius: 10, rings: 2, samples: 16 });
         this.quad = new FullScreenQuad(
             new THREE.ShaderMaterial({
@@ -106,6 +128,43 @@ void main() { gl_FragColor = vec4(vec3(mix(1.0, texture2D(map, at).r, darkness))
         );
     }
 
+    /** what is drawn of an object @param {THREE.Mesh} object @returns {THREE.Material} */
+    normalsOf(object) {
+        const own = /** @type {EffectData} */ (object.userData).normals;
+        if (own || !isSolid(object)) return own ?? HIDDEN;
+        const material = /** @type {THREE.Material} */ (object.material);
+        const { side, clippingPlanes, clipIntersection } = material;
+        const normals = this.normals.get(material) ?? new THREE.MeshNormalMaterial({ blending: THREE.NoBlending });
+        this.normals.set(material, normals);
+        return Object.assign(normals, { side, clippingPlanes, clipIntersection });
+    }
+
+    /** normals and depths of the scene @param {THREE.PerspectiveCamera} camera */
+    drawSurface(camera) {
+        const { renderer, scene } = this.stage;
+        /** @type {[THREE.Mesh, THREE.Material | THREE.Material[]][]} */
+        const drawn = [];
+        scene.traverseVisible((object) => {
+            // meshes, lines, points and sprites
+            const mesh = /** @type {THREE.Mesh} */ (object);
+            if (mesh.material) drawn.push([mesh, mesh.material]);
+        });
+        const { background } = scene;
+        const colour = renderer.getClearColor(new THREE.Color());
+        const alpha = renderer.getClearAlpha();
+        const shadows = renderer.shadowMap.autoUpdate;
+        for (const [mesh] of drawn) mesh.material = this.normalsOf(mesh);
+        scene.background = null;
+        renderer.shadowMap.autoUpdate = false;
+        renderer.setRenderTarget(this.surface);
+        renderer.setClearColor(0x7777ff, 1); // a normal towards the viewer
+        renderer.render(scene, camera);
+        renderer.setClearColor(colour, alpha);
+        renderer.shadowMap.autoUpdate = shadows;
+        scene.background = background;
+        for (const [mesh, material] of drawn) mesh.material = material;
+    }
+
     /** after the scene @param {THREE.PerspectiveCamera} camera */
     after(camera) {
         const { renderer, size } = this.stage;
@@ -113,6 +172,7 @@ void main() { gl_FragColor = vec4(vec3(mix(1.0, texture2D(map, at).r, darkness))
         const { x, y } = renderer.getDrawingBufferSize(this.buffer);
         const [width, height] = [Math.ceil(x * OCCLUSION_RESOLUTION), Math.ceil(y * OCCLUSION_RESOLUTION)];
         if (width !== this.pass.width || height !== this.pass.height) this.pass.setSize(width, height);
+        this.surface.setSize(width, height);
         this.pass.updateGtaoMaterial({
             radius: OCCLUSION_RADIUS * size,
             thickness: OCCLUSION_RADIUS * size,
@@ -122,6 +182,7 @@ void main() { gl_FragColor = vec4(vec3(mix(1.0, texture2D(map, at).r, darkness))
             samples: 16,
         });
         this.pass.updatePdMaterial({ depthPhi: 0.25 * OCCLUSION_RADIUS * size }); // farther places are of another surface
+        this.drawSurface(camera);
         // with its output off the pass writes its own buffers alone
         this.pass.render(renderer, this.pass.gtaoRenderTarget, this.pass.gtaoRenderTarget, 0, false);
         /** @type {THREE.ShaderMaterial} */ (this.quad.material).uniforms.map.value = this.pass.gtaoMap;
@@ -134,6 +195,8 @@ void main() { gl_FragColor = vec4(vec3(mix(1.0, texture2D(map, at).r, darkness))
 
     dispose() {
         this.pass.dispose();
+        this.surface.depthTexture?.dispose();
+        this.surface.dispose();
         /** @type {THREE.Material} */ (this.quad.material).dispose();
         this.quad.dispose();
     }

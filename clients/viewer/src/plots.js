@@ -2,9 +2,10 @@
 import { htmlById } from "./dom.js";
 
 export class Plots {
-    /** @param {import("./app_state.js").AppState} state */
-    constructor(state) {
+    /** @param {import("./app_state.js").AppState} state @param {import("./field_display.js").FieldDisplay} fields */
+    constructor(state, fields) {
         this.state = state;
+        this.fields = fields;
         this.opened = false;
         /** @type {import("./plots_panel.js").PlotsPanel | null} */
         this.panel = null;
@@ -15,6 +16,7 @@ export class Plots {
         if (opened === this.opened) return;
         this.opened = opened;
         htmlById("plots").hidden = !opened;
+        this.fields.setEnergy(opened);
         this.panel?.close();
         this.panel = null;
         if (!opened) return;

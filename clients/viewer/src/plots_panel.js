@@ -8,13 +8,13 @@ import { cssColour } from "./plan_panel.js";
 import { plotData, timeRange, valueRange } from "./plot_axes.js";
 import { toCsv } from "./plot_csv.js";
 import { picturePlots } from "./plot_picture.js";
-import { LENGTH_MAX_S, PlotSampler, STEP } from "./plot_sampler.js";
+import { ENERGIES, LENGTH_MAX_S, PlotSampler, STEP } from "./plot_sampler.js";
 import { text } from "./text.js";
 import uPlot from "./uplot.js";
 
 /**
  * @typedef {import("./plot_sampler.js").Channel} Channel
- * @typedef {import("./plot_sampler.js").Quantity | typeof STEP} ChartName
+ * @typedef {import("./plot_sampler.js").Quantity | "energy_mJ" | typeof STEP} ChartName
  * @typedef {{name: ChartName, min: number, figure: HTMLElement, plot: uPlot, values: HTMLElement, keys: string[]}} Chart
  */
 
@@ -22,13 +22,15 @@ import uPlot from "./uplot.js";
 const CHARTS = [
     ["force_N", 0.1],
     ["displacement_mm", 1],
+    ["depth_mm", 1],
     ["work_mJ", 0.1],
+    ["energy_mJ", 0.1],
     [STEP, 0.1],
 ];
 const LENGTHS_S = [30, LENGTH_MAX_S];
 const DRAW_MS = 100; // between two pictures of the plots: they are read, not watched
-const HEIGHT = 74; // of a chart, pixels: four fit beside the organ on a laptop
-const HEIGHT_NARROW = 50; // four fit below the organ on a telephone
+const HEIGHT = 54; // of a chart, pixels: six fit beside the organ on a laptop
+const HEIGHT_NARROW = 34; // six fit below the organ on a telephone
 /** @type {[number, number]} width and height of a chart in a saved picture, pixels: wider than a panel */
 const PICTURE = [820, 130];
 const TIME_AXIS = 22; // below the lowest chart, pixels
@@ -72,10 +74,12 @@ export class PlotsPanel {
         if (this.held) return;
         const { state } = this;
         this.sampler.take(time, tools, {
-            surfaces: state.bodies.values(),
+            surfaces: [...state.bodies.values()],
             stepMs: state.status?.step_ms,
             nameOf: (tool, i) => state.members.get(tool.holder)?.name ?? state.hello?.tools[i]?.name ?? "",
             capOf: (i) => state.hello?.tools[i]?.force_cap_N,
+            radiusOf: (i) => state.hello?.tools[i]?.radius_m ?? 0,
+            energies: state.status?.energies,
         });
         const now = performance.now();
         if (now - this.drawnAt < DRAW_MS) return;
@@ -140,10 +144,9 @@ export class PlotsPanel {
         const values = document.createElement("span");
         caption.append(text(`plots.${name}`), values);
         figure.append(caption);
-        const lines =
-            name === STEP
-                ? [{ stroke: ink, width: 1.25 }]
-                : channels.map(({ colour }) => ({ stroke: this.colourOf(colour), width: 1.75 }));
+        const lines = !ofTools(name)
+            ? keysOf(name).map((_, i) => ({ stroke: i ? quiet : ink, width: 1.25 }))
+            : channels.map(({ colour }) => ({ stroke: this.colourOf(colour), width: 1.75 }));
         const axis = { stroke: quiet, grid: { stroke: faint, width: 1 }, ticks: { show: false } };
         const plot = new uPlot(
             {
@@ -172,7 +175,7 @@ export class PlotsPanel {
             [[], ...lines.map(() => [])],
             figure,
         );
-        const keys = name === STEP ? [STEP] : channels.map(({ key }) => `${key}:${name}`);
+        const keys = !ofTools(name) ? keysOf(name) : channels.map(({ key }) => `${key}:${name}`);
         return { name, min, figure, plot, values, keys };
     }
 
@@ -207,7 +210,7 @@ export class PlotsPanel {
                     const value = column[at];
                     const cap = name === "force_N" ? channels[i]?.cap : undefined;
                     item.textContent = typeof value === "number" ? valueText(value, cap) : "–";
-                    if (name !== STEP && channels[i]) item.style.color = this.colourOf(channels[i].colour);
+                    if (ofTools(name) && channels[i]) item.style.color = this.colourOf(channels[i].colour);
                     return item;
                 }),
             );
@@ -244,6 +247,11 @@ export class PlotsPanel {
         if (blob) this.save(blob, "_plots.png");
     }
 }
+
+/** are the values of a chart those of tools? @param {ChartName} name @returns {name is import("./plot_sampler.js").Quantity} */
+const ofTools = (name) => name !== STEP && name !== "energy_mJ";
+/** columns of a chart of the whole session @param {ChartName} name */
+const keysOf = (name) => (name === STEP ? [STEP] : [...ENERGIES]);
 
 /** a number, as the unit stands in the caption; but a force at its cap says so @param {number} value @param {number | undefined} cap N */
 const valueText = (value, cap) => forceText(value, cap).replace(/^([\d.]+) N$/, "$1");

@@ -92,12 +92,16 @@ export class Section {
 
     /** planes as the user has chosen them @returns {import("./slice.js").Plane[]} */
     chosen() {
+        return this.inside.planes.flatMap((_, i) => this.where(i) ?? []);
+    }
+
+    /** a plane as the user has chosen it; null: it is off @param {number} i @returns {import("./slice.js").Plane | null} */
+    where(i) {
         const { hello } = this.state;
-        if (!hello) return [];
+        if (!hello) return null;
         this.stage.placeCameras();
         const view = this.stage.camera.position.clone().sub(this.stage.target).normalize().toArray();
-        const box = [hello.box_min_m, hello.box_max_m];
-        return this.inside.planes.flatMap((plane) => planeOf(plane, box, view) ?? []);
+        return planeOf(this.inside.planes[i], [hello.box_min_m, hello.box_max_m], view);
     }
 
     /** before a picture */
@@ -136,6 +140,7 @@ export class Section {
         this.cut.add(body);
         body.mesh.material.clippingPlanes = this.planes.length ? this.planes : null;
         body.mesh.material.clipIntersection = true;
+        body.mesh.material.clipShadows = true; // what is removed casts none
         body.mesh.material.needsUpdate = true;
     }
 
@@ -198,7 +203,12 @@ export class Section {
                 polygonOffsetUnits: 8,
             }),
         );
-        for (const { material } of [slice, fill]) material.clippingPlanes = beyond.length ? beyond : null;
+        const normals = new THREE.MeshNormalMaterial({ ...WHERE_OPEN, side: THREE.DoubleSide });
+        for (const material of [slice.material, fill.material, normals])
+            material.clippingPlanes = beyond.length ? beyond : null;
+        // for shadows and occlusion (picture_effects.js): a cap is as large as the body is open, which the stencil knows
+        Object.assign(fill.userData, { castsNone: true, normals });
+        for (const side of sides) side.userData.normals = side.material;
         // the next cap counts anew
         fill.onAfterRender = (renderer) => renderer.clearStencil();
         const group = new THREE.Group();
@@ -217,6 +227,7 @@ export class Section {
         if (!cap) return;
         this.stage.scene.remove(cap.group);
         for (const { material } of [...cap.sides, cap.slice, cap.fill]) material.dispose();
+        cap.fill.userData.normals.dispose();
         cap.slice.geometry.dispose();
         cap.fill.geometry.dispose();
         this.caps.delete(key);

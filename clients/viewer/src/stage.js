@@ -318,17 +318,21 @@ export class Stage {
         return (this.pane.box(this.canvas).height * this.camera.zoom) / (2 * half);
     }
 
-    /** ray through a pixel @param {number} x @param {number} y client pixels @returns {THREE.Ray} */
-    ray(x, y) {
+    /** place in the pane under the pointer, -1 to 1 from left to right and from below @param {number} x @param {number} y client pixels */
+    ndc(x, y) {
         const outer = this.canvas.getBoundingClientRect();
         const box = this.pane.box(this.canvas);
-        const ndc = new THREE.Vector2(
+        return new THREE.Vector2(
             ((x - outer.left - box.x) / box.width) * 2 - 1,
             1 - ((y - outer.top - box.y) / box.height) * 2,
         );
+    }
+
+    /** ray through a pixel @param {number} x @param {number} y client pixels @returns {THREE.Ray} */
+    ray(x, y) {
         this.placeCameras();
         const caster = new THREE.Raycaster();
-        caster.setFromCamera(ndc, this.camera);
+        caster.setFromCamera(this.ndc(x, y), this.camera);
         return caster.ray;
     }
 

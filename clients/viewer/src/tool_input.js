@@ -45,6 +45,8 @@ export class ToolInput {
         /** @type {ToolTarget} where the keyboard holds the tool */
         this.held = null;
         this.onFirstDrag = () => {};
+        /** @type {() => import("./plane_handles.js").PlaneHandles | null} asked before the organ */
+        this.handles = () => null;
         const c = stage.canvas;
         c.addEventListener("pointerdown", (e) => this.down(e));
         c.addEventListener("pointermove", (e) => this.move(e));
@@ -56,7 +58,7 @@ export class ToolInput {
         c.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
         c.addEventListener("dblclick", (e) => {
             stage.choose(e);
-            if (!this.hit(e)) stage.home();
+            if (!this.handles()?.hover(e) && !this.hit(e)) stage.home();
         });
     }
 
@@ -73,11 +75,16 @@ export class ToolInput {
         this.pointers.set(e.pointerId, { x: e.clientX, y: e.clientY });
         if (this.pointers.size > 1) {
             this.release();
+            this.handles()?.release();
             this.clickStart = null;
             return;
         }
         this.stage.choose(e);
         this.clickStart = null;
+        if (e.button === 0 && this.handles()?.take(e)) {
+            c.classList.add("busy");
+            return;
+        }
         if (this.mode === "sculpt") {
             const at = e.button === 0 ? this.hit(e) : null;
             if (at) this.clickStart = { id: e.pointerId, at, x: e.clientX, y: e.clientY };
@@ -122,6 +129,8 @@ export class ToolInput {
             this.drag.x = e.clientX;
             this.drag.y = e.clientY;
             this.tick();
+        } else if (this.handles()?.held) {
+            this.handles()?.drag(e);
         } else if (this.pointers.size === 1) {
             if (e.buttons & 4 || e.ctrlKey) this.stage.pan(dx, dy);
             else this.stage.orbit(dx, dy);
@@ -152,8 +161,10 @@ export class ToolInput {
         if (!mouse || this.pointers.size || now - mouse.at < HOVER_MS) return;
         if (mouse.picture >= 0 && !(sculpts && stage.pictures > mouse.picture)) return;
         Object.assign(mouse, { at: now, picture: stage.pictures });
-        const hit = this.enabled || sculpts ? this.hit({ clientX: mouse.x, clientY: mouse.y }) : null;
-        stage.canvas.classList.toggle("over", hit !== null);
+        const at = { clientX: mouse.x, clientY: mouse.y };
+        const handle = this.handles()?.hover(at) ?? null;
+        const hit = !handle && (this.enabled || sculpts) ? this.hit(at) : null;
+        stage.canvas.classList.toggle("over", (handle ?? hit) !== null);
         if (sculpts) this.onHover(hit);
     }
 
@@ -167,6 +178,7 @@ export class ToolInput {
                 this.onClick(clickStart.at);
         }
         if (this.drag && this.drag.id === e.pointerId) this.release();
+        this.handles()?.release();
         if (this.pointers.size === 0) this.stage.canvas.classList.remove("busy");
     }
 

@@ -78,7 +78,7 @@ test("refuses fields of bad kinds, ranges, counts and blocks", () => {
         [5, 1, "FLAGS"],
         [6, 16, "RANGE"],
         [12, 0, "RANGE"],
-        [12, 8, "RANGE"],
+        [12, 10, "RANGE"],
         [15, 128, "RANGE"],
         [23, 255, "RANGE"],
         [27, 127, "RANGE"],

@@ -44,7 +44,7 @@ test("refuses damaged messages", () => {
     assert.throws(() => decode(Uint8Array.from([...whole, 0])), /interior/);
     for (const [at, value, format] of [
         [12, 0, "setUint32"],
-        [12, 8, "setUint32"],
+        [12, 10, "setUint32"],
         [20, 1 << 21, "setUint32"],
         [24, NaN, "setFloat32"],
         [28, -1, "setFloat32"],

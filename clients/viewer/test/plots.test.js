@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { plotData, timeRange, valueRange } from "../src/plot_axes.js";
 import { toCsv } from "../src/plot_csv.js";
-import { LENGTH_MAX_S, PlotSampler, displacementAt, workBetween } from "../src/plot_sampler.js";
+import { LENGTH_MAX_S, PlotSampler, depthAt, displacementAt, energyRow, workBetween } from "../src/plot_sampler.js";
 import { SampleRing } from "../src/sample_ring.js";
 
 test("a history keeps the newest rows, in order, whatever came before", () => {
@@ -56,18 +56,37 @@ const tool = (changes) =>
         force: [0, 0, 0],
         ...changes,
     });
-/** @type {any} a surface of two vertices, the second of which has moved by 5 mm */
+/** @type {any} a triangle whose normal is z, the second vertex of which has moved by 5 mm */
 const surface = {
-    rest: Float32Array.of(0, 0, 0, 1, 0, 0),
+    rest: Float32Array.of(0, 0, 0, 1, 0, 0, 0, 9, 0),
+    triangles: () => Uint32Array.of(0, 1, 2),
     visible: null,
-    position: { array: Float32Array.of(0, 0, 0, 1, 0.003, 0.004) },
+    position: { array: Float32Array.of(0, 0, 0, 1, 0.003, 0.004, 0, 9, 0) },
 };
-
 test("the displacement is that of the vertex next to the tool", () => {
     assert.equal(displacementAt([surface], [0.1, 0, 0]), 0);
     assert.ok(Math.abs(displacementAt([surface], [0.9, 0, 0]) - 0.005) < 1e-6);
     assert.equal(displacementAt([{ ...surface, visible: Uint32Array.of(0) }], [0.9, 0, 0]), 0);
     assert.equal(displacementAt([], [0, 0, 0]), 0);
+});
+
+test("the depth is that of the lowest point of the tool below the surface at rest", () => {
+    const near = (/** @type {number} */ a, /** @type {number} */ b) => assert.ok(Math.abs(a - b) < 1e-9, `${a} ${b}`);
+    const depth = (/** @type {number} */ z, radius = 0.01) => depthAt([surface], [0.9, 0.2, z], radius);
+    near(depth(0.01), 0); // it touches
+    near(depth(0.004), 0.006);
+    near(depth(-0.003), 0.013);
+    near(depth(0.025), -0.015); // what it grasps is lifted
+    near(depth(-0.003, 0), 0.003);
+    assert.equal(depthAt([], [0, 0, 0], 0.01), 0);
+});
+
+test("energies are sums over the bodies, unknown where there is none", () => {
+    const body = { kinetic_J: 0.001, elastic_J: 0.0025 };
+    const row = energyRow([body, { kinetic_J: 0.003, elastic_J: 0 }]);
+    assert.ok(Math.abs(row.energy_mJ - 6.5) < 1e-9 && Math.abs(row.kinetic_mJ - 4) < 1e-9);
+    assert.deepEqual(energyRow([]), {});
+    assert.deepEqual(energyRow(undefined), {});
 });
 
 test("the work against a spring is its energy, and comes back", () => {
@@ -82,7 +101,14 @@ test("the work against a spring is its energy, and comes back", () => {
 
 test("a sample has force, displacement and work of each held tool, and a message between samples adds its work", () => {
     const sampler = new PlotSampler();
-    const scene = { surfaces: [surface], stepMs: 2, nameOf: () => "Ada", capOf: () => 15 };
+    const scene = {
+        surfaces: [surface],
+        stepMs: 2,
+        nameOf: () => "Ada",
+        capOf: () => 15,
+        radiusOf: () => 0.01,
+        energies: undefined,
+    };
     const take = (/** @type {number} */ t, /** @type {any[]} */ ...tools) => sampler.take(t, tools, scene);
     take(1, tool({ position: [1, 0, 0], force: [-3, 4, 0] }), tool({ held: false }));
     take(1.001, tool({ position: [1.001, 0, 0], force: [-3, 4, 0] }), tool({ held: false })); // too soon for a sample
@@ -108,7 +134,14 @@ test("a sample has force, displacement and work of each held tool, and a message
 
 test("the history is two minutes at 60 messages a second, also in slow motion", () => {
     const sampler = new PlotSampler();
-    const scene = { surfaces: [], stepMs: 1, nameOf: () => "", capOf: () => undefined };
+    const scene = {
+        surfaces: [],
+        stepMs: 1,
+        nameOf: () => "",
+        capOf: () => undefined,
+        radiusOf: () => 0,
+        energies: undefined,
+    };
     for (const hz of [60, 600]) {
         for (let k = 0; k < 130 * hz; k++) sampler.take(k / hz, [], scene);
         const { times } = sampler.ring.since(-Infinity);

@@ -8,8 +8,8 @@
 #include <math.h>
 #include <string.h>
 
-static const char *const field_name[PAL_FIELD_COUNT] = {"none",      "displacement", "von_mises",  "energy",
-                                                        "stiffness", "strain",       "distortion", "young"};
+static const char *const field_name[PAL_FIELD_COUNT] = {"none",   "displacement", "von_mises", "energy",  "stiffness",
+                                                        "strain", "distortion",   "young",     "density", "damping"};
 
 const char *pal_field_name(pal_field field)
 {
@@ -27,7 +27,8 @@ const char *pal_field_title(pal_field field)
 {
     static const char *const title[PAL_FIELD_COUNT] = {
         "no field",       "displacement",   "von Mises stress",  "strain energy density",
-        "edge stiffness", "largest strain", "volume distortion", "Young's modulus"};
+        "edge stiffness", "largest strain", "volume distortion", "Young's modulus",
+        "density",        "damping"};
     return title[(unsigned)field < PAL_FIELD_COUNT ? field : PAL_FIELD_NONE];
 }
 
@@ -78,6 +79,28 @@ double pal_body_kinetic_J(const pal_body *body)
         sum += 0.5 * body->mass_kg[i] * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
     }
     return sum;
+}
+
+double pal_body_element_volume_m3(const pal_body *body, const int32_t *corner)
+{
+    const double *x = body->x_rest, *o = x + 3 * corner[0];
+    double e[3], n[3];
+    if (body->n_corner != 8) return pal_tet_volume(x, corner);
+    pal_sub3(e, x + 3 * corner[1], o);
+    pal_normal3(n, o, x + 3 * corner[2], x + 3 * corner[4]);
+    return pal_dot3(e, n);
+}
+
+void pal_body_measure_density(const pal_body *body, double *mass_kg, double *volume_m3)
+{
+    const bool own = body->element != NULL;
+    const int n = own ? body->n_element : body->tets->n_tet, n_corner = own ? body->n_corner : 4;
+    for (int e = 0; e < n; e++) {
+        const int32_t *corner = (own ? body->element : body->tets->tet) + (size_t)n_corner * (size_t)e;
+        const double filled = pal_body_element_volume_m3(body, corner) * (body->fill ? (double)body->fill[e] : 1);
+        for (int c = 0; c < n_corner; c++) volume_m3[corner[c]] += filled * pal_body_corner_share(n_corner, c);
+    }
+    for (int i = 0; i < body->n_node; i++) mass_kg[i] += body->node_mass_kg[i];
 }
 
 bool pal_body_finite(const pal_body *body)

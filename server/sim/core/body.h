@@ -39,23 +39,27 @@ typedef enum pal_field {
     PAL_FIELD_DISPLACEMENT_M,
     PAL_FIELD_VON_MISES_PA,
     PAL_FIELD_ENERGY_J_M3,
-    PAL_FIELD_STIFFNESS_J, /* mean constant k_d of the edges at a node, paper B fig. 13 f */
-    PAL_FIELD_STRAIN,      /* largest principal stretch - 1, paper A fig. 13              */
-    PAL_FIELD_DISTORTION,  /* volume over volume at rest - 1                              */
-    PAL_FIELD_YOUNG_PA,    /* Young's modulus of the material there, paper A figs. 8b, 9b */
+    PAL_FIELD_STIFFNESS_J,   /* mean constant k_d of the edges at a node, paper B fig. 13 f */
+    PAL_FIELD_STRAIN,        /* largest principal stretch - 1, paper A fig. 13              */
+    PAL_FIELD_DISTORTION,    /* volume over volume at rest - 1                              */
+    PAL_FIELD_YOUNG_PA,      /* Young's modulus of the material there, paper A figs. 8b, 9b */
+    PAL_FIELD_DENSITY_KG_M3, /* of the material there                                     */
+    PAL_FIELD_DAMPING_1_S,   /* drag over momentum (component viscous)                    */
     PAL_FIELD_COUNT
 } pal_field;
-/* "displacement", "von_mises", "energy", "stiffness", "strain", "distortion", "young", "none"; never NULL [any] */
+/* "displacement", "von_mises", "energy", "stiffness", "strain", "distortion", "young", "density",
+ * "damping", "none"; never NULL [any] */
 const char *pal_field_name(pal_field field);
 pal_field pal_field_find(const char *name);   /* NONE: there is no field of that name [any] */
 const char *pal_field_title(pal_field field); /* for sentences: "von Mises stress" [any]    */
 
 /* values of a field at the shown vertices, written by its component and valid while that exists */
 typedef struct pal_shown_field {
-    float *value;      /* SI                                    [n_shown] */
-    double *node;      /* the same at the nodes, NULL: not computed [n_node] */
-    uint64_t revision; /* different for every set of values               */
-    double time_s;     /* simulated time at which they were computed      */
+    float *value;                /* SI                                    [n_shown] */
+    double *node;                /* the same at the nodes, NULL: not computed [n_node] */
+    uint64_t revision;           /* different for every set of values               */
+    double time_s;               /* simulated time at which they were computed      */
+    double kinetic_J, elastic_J; /* of the body then; of the field energy only   */
 } pal_shown_field;
 
 /* who moves a dof: the solver, nobody, or a component that gives its velocity */
@@ -215,6 +219,16 @@ void pal_body_add_display_offset(pal_body *body);
 /* sums over the body. [sim] */
 double pal_body_kinetic_J(const pal_body *body);
 bool pal_body_finite(const pal_body *body); /* are x and v? */
+/* volume at rest of an element with these nodes (box of 8 corners, else tetrahedron), and the share of its mass that a
+ * corner takes. [load] [sim] */
+double pal_body_element_volume_m3(const pal_body *body, const int32_t *corner);
+static inline double pal_body_corner_share(int n_corner, int corner)
+{
+    return n_corner < 10 ? 1.0 / n_corner : corner < 4 ? 1.0 / 36 : 4.0 / 27;
+}
+/* Density of a body whose mass is lumped from elements, as the hook `measure` adds it: mass and filled volume of each
+ * node. [sim] */
+void pal_body_measure_density(const pal_body *body, double *mass_kg, double *volume_m3);
 /* Freezes the body with one sentence as its reason; a frozen body keeps its first reason. dof: named in the sentence
  * together with the smallest element around it and its place at rest (scene frame, mm); -1: none. No heap. [sim] */
 void pal_body_stop(pal_body *body, int dof, const char *format, ...) __attribute__((format(printf, 3, 4)));

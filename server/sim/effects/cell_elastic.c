@@ -114,7 +114,7 @@ static double von_mises(const pal_cell_points *points, int p)
 {
     return points->von_mises_Pa[p];
 }
-static double density(const pal_cell_points *points, int p)
+static double energy_density(const pal_cell_points *points, int p)
 {
     return points->energy_J_m3[p];
 }
@@ -133,13 +133,17 @@ static double young(const pal_cell_points *points, int p)
     return points->young_Pa[p];
 }
 
+static double mass_density(const pal_cell_points *points, int p)
+{
+    return points->density_kg_m3[p];
+}
+
 static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
 {
-    static pal_cell_value *const value[PAL_FIELD_COUNT] = {[PAL_FIELD_VON_MISES_PA] = von_mises,
-                                                           [PAL_FIELD_ENERGY_J_M3] = density,
-                                                           [PAL_FIELD_STRAIN] = strain,
-                                                           [PAL_FIELD_DISTORTION] = distortion,
-                                                           [PAL_FIELD_YOUNG_PA] = young};
+    static pal_cell_value *const value[PAL_FIELD_COUNT] = {
+        [PAL_FIELD_VON_MISES_PA] = von_mises, [PAL_FIELD_ENERGY_J_M3] = energy_density,
+        [PAL_FIELD_STRAIN] = strain,          [PAL_FIELD_DISTORTION] = distortion,
+        [PAL_FIELD_YOUNG_PA] = young,         [PAL_FIELD_DENSITY_KG_M3] = mass_density};
     if (value[field]) pal_cells_elastic_measure(self, body->d, value[field], sum, volume_m3);
 }
 

@@ -152,11 +152,26 @@ static void measure_tets(const pal_body *body, pal_field field, double *sum, dou
     }
 }
 
+/* of nodes, a quarter of each tetrahedron, for the energy density of all kinds of springs */
+static void measure_volumes(const pal_body *body, double *volume_m3)
+{
+    for (int t = 0; t < body->tets->n_tet; t++) {
+        const int32_t *node = body->tets->tet + 4 * (size_t)t;
+        const double quarter = fabs(pal_tet_volume(body->x_rest, node)) / 4;
+        for (int k = 0; k < 4; k++) volume_m3[node[k]] += quarter;
+    }
+}
+
 /* the constant before the springs' weights, which differ between edges of a lattice */
 static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
 {
     const edge_distance *e = self;
     if (field == PAL_FIELD_STRAIN || field == PAL_FIELD_DISTORTION) measure_tets(body, field, sum, volume_m3);
+    if (field == PAL_FIELD_ENERGY_J_M3) {
+        pal_spring_measure_energy(&e->set, body, PAL_SPRING_DISTANCE, sum);
+        measure_volumes(body, volume_m3);
+    }
+    if (field == PAL_FIELD_DENSITY_KG_M3) pal_body_measure_density(body, sum, volume_m3);
     if (field != PAL_FIELD_STIFFNESS_J) return;
     if (e->set.whole) {
         measure_regions(&e->set, sum, volume_m3);
@@ -176,4 +191,5 @@ const pal_effect pal_effect_edge_distance = {
     .bounds = {.stiffness = stiffness, .damping = damping},
     .material = pal_spring_set_material,
     .inspect = {.measure = measure,
-                .fields = 1u << PAL_FIELD_STIFFNESS_J | 1u << PAL_FIELD_STRAIN | 1u << PAL_FIELD_DISTORTION}};
+                .fields = 1u << PAL_FIELD_STIFFNESS_J | 1u << PAL_FIELD_STRAIN | 1u << PAL_FIELD_DISTORTION |
+                          1u << PAL_FIELD_DENSITY_KG_M3 | 1u << PAL_FIELD_ENERGY_J_M3}};

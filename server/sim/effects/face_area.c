@@ -59,6 +59,13 @@ PAL_INLINE void bound_kernel(const double *p[][3], pal_v8 w, pal_v8 kq, bool ben
 
 PAL_SPRING_MEMBERS(PAL_SPRING_AREA, 3)
 
+/* without volumes: those of edge_distance count */
+static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
+{
+    (void)volume_m3;
+    if (field == PAL_FIELD_ENERGY_J_M3) pal_spring_measure_energy(self, body, PAL_SPRING_AREA, sum);
+}
+
 const pal_effect pal_effect_face_area = {.name = "face_area",
                                          .stage = PAL_STAGE_FORCE,
                                          .make = make,
@@ -67,4 +74,5 @@ const pal_effect pal_effect_face_area = {.name = "face_area",
                                          .internal = true,
                                          .energy = spring_energy,
                                          .bounds = {.stiffness = spring_stiffness, .damping = spring_damping},
-                                         .material = pal_spring_set_material};
+                                         .material = pal_spring_set_material,
+                                         .inspect = {.measure = measure}};

@@ -6,8 +6,8 @@
  * distance of a shown vertex from its rest position. A number that is not finite is shown as 0, as are inactive
  * vertices of an adaptive body.
  *
- * Keys: field ("displacement" | "von_mises" | "energy" | "stiffness" | "strain" | "distortion" | "young"),
- * rate_hz (10: updates per simulated second). */
+ * Keys: field ("displacement" | "von_mises" | "energy" | "stiffness" | "strain" | "distortion" | "young" |
+ * "density" | "damping"), rate_hz (10: updates per simulated second). */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 
@@ -32,10 +32,11 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     pal_field kind = pal_field_find(name);
     if (kind == PAL_FIELD_NONE)
-        return PAL_REFUSE(
-            build->diag,
-            "%s: there is no field \"%s\" (displacement, von_mises, energy, stiffness, strain, distortion, young)",
-            item->path, name);
+        return PAL_REFUSE(build->diag,
+                          "%s: there is no field \"%s\" (displacement, von_mises, energy, stiffness, strain, "
+                          "distortion, young, density, "
+                          "damping)",
+                          item->path, name);
     if (body->display.n_shown == 0 || !body->display.surface)
         return PAL_REFUSE(build->diag, "%s: the body shows nothing that could be coloured", item->path);
     field_output *out = PAL_NEW(build->arena, field_output, 1);
@@ -96,6 +97,11 @@ static void measured(field_output *out, const pal_step *step)
     for (int i = 0; i < step->n_force; i++) {
         const pal_effect *effect = step->force[i].effect;
         if (effect->inspect.measure) effect->inspect.measure(step->force[i].self, body, out->kind, sum, out->volume_m3);
+    }
+    if (out->kind == PAL_FIELD_ENERGY_J_M3) {
+        out->shown.kinetic_J = pal_body_kinetic_J(body);
+        out->shown.elastic_J = 0;
+        for (int i = 0; i < body->n_node; i++) out->shown.elastic_J += sum[i];
     }
     for (int i = 0; i < body->n_node; i++) sum[i] = out->volume_m3[i] > 0 ? sum[i] / out->volume_m3[i] : 0;
     spread(body, sum, out->shown.value);

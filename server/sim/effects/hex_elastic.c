@@ -137,7 +137,10 @@ static void rotate(void *self, const pal_body *body, double *rotation)
 
 static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
 {
-    pal_hex_measure(self, body, field, sum, volume_m3);
+    if (field == PAL_FIELD_DENSITY_KG_M3)
+        pal_body_measure_density(body, sum, volume_m3);
+    else
+        pal_hex_measure(self, body, field, sum, volume_m3);
 }
 
 static void stress(void *self, const pal_body *body, pal_stress_take *take, void *user)

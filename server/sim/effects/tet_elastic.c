@@ -108,7 +108,10 @@ static void reset(void *self, const pal_body *body)
 
 static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
 {
-    pal_elastic_tets_measure(self, body->d, field, sum, volume_m3);
+    if (field == PAL_FIELD_DENSITY_KG_M3)
+        pal_body_measure_density(body, sum, volume_m3);
+    else
+        pal_elastic_tets_measure(self, body->d, field, sum, volume_m3);
 }
 
 static void stress(void *self, const pal_body *body, pal_stress_take *take, void *user)

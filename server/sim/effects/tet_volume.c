@@ -129,6 +129,13 @@ static void reset(void *self, const pal_body *body)
     if (recovery(self)) pal_recovery_reset(recovery(self));
 }
 
+/* without volumes: those of edge_distance count */
+static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
+{
+    (void)volume_m3;
+    if (field == PAL_FIELD_ENERGY_J_M3) pal_spring_measure_energy(self, body, PAL_SPRING_VOLUME, sum);
+}
+
 const pal_effect pal_effect_tet_volume = {PAL_EFFECT("tet_volume", FORCE),
                                           .destroy = spring_destroy,
                                           .reset = reset,
@@ -137,4 +144,5 @@ const pal_effect pal_effect_tet_volume = {PAL_EFFECT("tet_volume", FORCE),
                                           .sleep.settled_s = settled_s,
                                           .bounds = {.stiffness = stiffness, .damping = damping},
                                           .recovery = {.recover = recover, .state = recovery},
-                                          .material = pal_spring_set_material};
+                                          .material = pal_spring_set_material,
+                                          .inspect = {.measure = measure}};

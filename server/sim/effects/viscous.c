@@ -47,6 +47,15 @@ static void damping(void *self, const pal_body *body, double *bound_Ns_m)
     }
 }
 
+/* the same at every node */
+static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
+{
+    for (int k = 0; k < pal_body_nodes(body) && field == PAL_FIELD_DAMPING_1_S; k++) {
+        const int i = body->active ? body->active[k] : k;
+        sum[i] += drag(self), volume_m3[i] += 1;
+    }
+}
+
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
 {
     viscous *row = self;
@@ -61,4 +70,5 @@ const pal_effect pal_effect_viscous = {.name = "viscous",
                                        .run = run,
                                        .bounds.damping = damping,
                                        .drag = drag,
-                                       .material = material};
+                                       .material = material,
+                                       .inspect = {.measure = measure, .fields = 1u << PAL_FIELD_DAMPING_1_S}};

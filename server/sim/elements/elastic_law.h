@@ -13,7 +13,7 @@
 /* fields that elements measure */
 enum {
     PAL_ELASTIC_FIELDS = 1 << PAL_FIELD_VON_MISES_PA | 1 << PAL_FIELD_ENERGY_J_M3 | 1 << PAL_FIELD_STRAIN |
-                         1 << PAL_FIELD_DISTORTION | 1 << PAL_FIELD_YOUNG_PA
+                         1 << PAL_FIELD_DISTORTION | 1 << PAL_FIELD_YOUNG_PA | 1 << PAL_FIELD_DENSITY_KG_M3
 };
 
 /* what a pass over elements computes: forces are added, the energy is returned */

@@ -148,16 +148,6 @@ static pal_err make_fill(const pal_build *build, const fem_choice *choice)
     return PAL_ERR_OK;
 }
 
-static double element_volume(const pal_body *body, const int32_t *c)
-{
-    const double *x = body->x_rest, *o = x + 3 * c[0];
-    double e[3], n[3];
-    if (body->n_corner != 8) return pal_tet_volume(x, c);
-    pal_sub3(e, x + 3 * c[1], o);
-    pal_normal3(n, o, x + 3 * c[2], x + 3 * c[4]);
-    return pal_dot3(e, n);
-}
-
 static pal_err lump_mass(const pal_build *build)
 {
     pal_body *body = build->body;
@@ -168,9 +158,9 @@ static pal_err lump_mass(const pal_build *build)
         pal_material material;
         for (int c = 0; c < n_mean; c++) pal_axpy3(centre, 1.0 / n_mean, body->x_rest + 3 * node[c]);
         pal_material_at(build->def, centre, &material);
-        double mass = material.density_kg_m3 * element_volume(body, node) * (body->fill ? (double)body->fill[e] : 1);
-        for (int c = 0; c < n_corner; c++)
-            body->mass_kg[node[c]] += mass * (n_corner < 10 ? 1.0 / n_corner : c < 4 ? 1.0 / 36 : 4.0 / 27);
+        double mass =
+            material.density_kg_m3 * pal_body_element_volume_m3(body, node) * (body->fill ? (double)body->fill[e] : 1);
+        for (int c = 0; c < n_corner; c++) body->mass_kg[node[c]] += mass * pal_body_corner_share(n_corner, c);
     }
     for (int i = 0; i < body->n_node; i++)
         if (!(body->mass_kg[i] > 0))

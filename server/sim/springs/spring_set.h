@@ -67,6 +67,22 @@ PAL_INLINE double pal_spring_energy(const pal_spring_set *set, const pal_body *b
     return sum;
 }
 
+/* energy_J [n_node] += the energy of each spring, in equal parts at its corners */
+PAL_INLINE void pal_spring_measure_energy(const pal_spring_set *set, const pal_body *body, pal_spring_kind kind,
+                                          double *energy_J)
+{
+    for (int i = 0; i < set->n_item; i++) {
+        const double *x[PAL_CORNERS];
+        pal_constraint s;
+        int lane = set->simd_blocks.place[i];
+        pal_spring_corners(set, body->d, i, x);
+        pal_spring_constraint(kind, x, set->w[lane], &s);
+        for (int c = 0; c < set->n_corner; c++)
+            energy_J[set->item[set->n_corner * i + c]] +=
+                0.5 * set->q[lane] * set->spring.k_J * s.c * s.c / set->n_corner;
+    }
+}
+
 /* f -= c q (sum of g.v) g */
 PAL_INLINE void pal_spring_damp(const pal_spring_set *set, const pal_body *body, pal_spring_kind kind)
 {

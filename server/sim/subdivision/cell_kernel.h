@@ -121,7 +121,7 @@ typedef struct pal_cell_points {
     double von_mises_Pa[PAL_CELL_GAUSS_POINTS], energy_J_m3[PAL_CELL_GAUSS_POINTS];
     double det_f[PAL_CELL_GAUSS_POINTS];   /* volume now over volume at rest      */
     double stretch[PAL_CELL_GAUSS_POINTS]; /* largest principal stretch less 1 */
-    double young_Pa[PAL_CELL_GAUSS_POINTS];
+    double young_Pa[PAL_CELL_GAUSS_POINTS], density_kg_m3[PAL_CELL_GAUSS_POINTS];
     double rotation[9]; /* Q                                   */
 } pal_cell_points;
 /* the same for both operators */

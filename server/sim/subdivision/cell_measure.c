@@ -95,6 +95,7 @@ void pal_cells_elastic_points(const pal_cells_elastic *c, const double *d, pal_c
         out->det_f[p] = pal_det3(f);
         out->stretch[p] = pal_largest_strain(f);
         out->young_Pa[p] = (double)c->solid->samples[kind].young_Pa[PAL_CELL_GAUSS_POINTS * element + p];
+        out->density_kg_m3[p] = (double)c->solid->samples[kind].density_kg_m3[PAL_CELL_GAUSS_POINTS * element + p];
         pal_elastic_mul(h, out->rotation, true, f);
         for (int i = 0; i < 9; i += 4) h[i] -= 1;
         e[0] = h[0], e[1] = h[4], e[2] = h[8];

@@ -29,6 +29,7 @@ typedef struct pal_frame_part {
     bool asleep;                  /* at rest: its components do not run until something comes near (component sleep) */
     uint64_t n_output;            /* OUTPUT runs of the body so far; unchanged: nothing here was recomputed */
     pal_frame_field field[PAL_FIELD_COUNT]; /* by pal_field */
+    double kinetic_J, elastic_J;            /* with the field energy, at its time_s */
     /* Adaptive bodies (adaptive_surface.h): the table of drawn triangles at this revision, 0 0 0 in empty slots.
      * Vertices of no triangle are hidden and their positions are undefined. n_slot 0: the triangles never change */
     int n_slot;

@@ -38,6 +38,7 @@ static void copy_fields(const pal_shown *shown, const pal_body *body, pal_frame_
         if (field->node) copy_nodes(body, from->node, to->n_node, field->node);
         field->revision = from->revision;
         field->time_s = from->time_s;
+        if (k == PAL_FIELD_ENERGY_J_M3) to->kinetic_J = from->kinetic_J, to->elastic_J = from->elastic_J;
     }
 }
 

@@ -396,7 +396,7 @@ static void nodes_show_their_constant_in_colour(void)
     REQUIRE(row && row->effect->inspect.measure);
     double sum[128] = {0}, volume[128] = {0};
     REQUIRE(b.body->n_dof == NODES);
-    row->effect->inspect.measure(row->self, b.body, PAL_FIELD_ENERGY_J_M3, sum, volume);
+    row->effect->inspect.measure(row->self, b.body, PAL_FIELD_VON_MISES_PA, sum, volume);
     for (int i = 0; i < NODES; i++) CHECK_NEAR(volume[i] + sum[i], 0, 0);
     row->effect->inspect.measure(row->self, b.body, PAL_FIELD_STIFFNESS_J, sum, volume);
     /* the grid's nodes are the body's */
@@ -407,7 +407,7 @@ static void nodes_show_their_constant_in_colour(void)
     pal_world *world;
     REQUIRE(bench_make(&b) && !pal_world_create(b.scene, &diag, &world));
     CHECK(pal_world_has_field(world, 0, PAL_FIELD_STIFFNESS_J) &&
-          !pal_world_has_field(world, 0, PAL_FIELD_ENERGY_J_M3));
+          !pal_world_has_field(world, 0, PAL_FIELD_VON_MISES_PA));
     REQUIRE(!pal_world_field(world, 0, PAL_FIELD_STIFFNESS_J, true, &diag));
     pal_body *body = pal_world_body(world, 0);
     const float *value = body->display.field[PAL_FIELD_STIFFNESS_J]->value;
