@@ -111,7 +111,8 @@ static void client_measure(pal_scripted_client *t, client_part *part)
         const float *p = part->now_m + 3 * (size_t)i, *f = part->first_m + 3 * (size_t)i;
         double moved = 0;
         for (int k = 0; k < 3; k++) {
-            const double size = high[k] - low[k] + 0.1;
+            /* a free body may drift by a metre while its damping stops it */
+            const double size = high[k] - low[k] + 1;
             if (!(p[k] > low[k] - size && p[k] < high[k] + size)) {
                 client_fault(t, PAL_FAULT_PLACE, "vertex %u axis %d at %g m", i, k, (double)p[k]);
                 return;
