@@ -4,19 +4,20 @@
  * Each world step continues from the present shape with zero velocities and makes at most `newton` iterations. The
  * linear systems K d = r (K as the components have it: the corotational law omits the derivative of the rotations,
  * which costs iterations but keeps the energy falling at full steps) are solved
- *   direct: by a factor of the present K, rebuilt in every iteration (once for the linear law),
- *   pcg:    by conjugate gradients with the warped factor of K at rest (preconditioner.h),
- *   multigrid: by conjugate gradients with multigrid, for voxel hexahedra (preconditioner.h); its levels are made of
- * the present K before the next solve after one that took more than 20 iterations, auto:   as multigrid for large
- * bodies of voxel hexahedra; else as pcg, but after a solve that took more iterations than a factor is worth by its
- * operation count, the present K is factored before the next; where that repeats at once, before every solve until an
- * iteration leaves a tenth of the residual or less, incomplete: by conjugate gradients with an incomplete factor of the
- * present K (num/incomplete_cholesky.h) in every iteration: a tenth of the memory or less, for bodies of many nodes;
- * iterations increase strongly for nearly incompressible and for thin bodies. After an iteration that left more than a
- * tenth of the residual, the next solves for the true stiffness (differences of forces along each direction, system.h)
- * by conjugate gradients with the same factor (truncated Newton; Nash 2000): half the iterations or fewer on a bent
- * beam. If that meets a direction of non-positive curvature too early, as far from equilibrium in a nearly
- * incompressible body, its result is discarded and K is used.
+ *   direct:     by a factor of the present K, rebuilt in every iteration (once for the linear law);
+ *   pcg:        by conjugate gradients with the warped factor of K at rest (preconditioner.h);
+ *   multigrid:  by conjugate gradients with multigrid, for voxel hexahedra. Its levels are made of the present K before
+ *               the solve after one that took more than 20 iterations;
+ *   incomplete: by conjugate gradients with an incomplete factor of the present K in every iteration, in a tenth of the
+ *               memory or less. Iterations increase strongly for nearly incompressible and for thin bodies;
+ *   auto:       as multigrid for large bodies of voxel hexahedra, else as pcg. After a solve that took more iterations
+ *               than a factor is worth by its operation count, the present K is factored before the next; where that
+ *               repeats at once, before every solve until an iteration leaves a tenth of the residual or less.
+ *
+ * After an iteration that left more than a tenth of the residual, the next solves for the true stiffness (differences
+ * of forces along each direction, system.h) by conjugate gradients with the same preconditioner (truncated Newton; Nash
+ * 2000): half the iterations or fewer on a bent beam. If that meets a direction of non-positive curvature too early, as
+ * far from equilibrium in a nearly incompressible body, its result is discarded and K is used.
  *
  * The line search requires a decrease of the energy; where the expected decrease is below the energy's rounding, it
  * tests the slope at the trial point (approximate Wolfe condition; Hager & Zhang 2005).
