@@ -7,7 +7,16 @@
 
 typedef float pal_single8 __attribute__((vector_size(32)));
 typedef float pal_single8_memory __attribute__((vector_size(32), aligned(4), may_alias));
-#define HEX_VECTOR pal_single8
+/* as many blocks at once as the processor has numbers side by side for; every operation is lane by lane, so that their
+ * number does not change a bit */
+#ifdef __AVX512F__
+enum { BLOCKS = 2 };
+typedef float single_wide __attribute__((vector_size(64)));
+#else
+enum { BLOCKS = 1 };
+typedef pal_single8 single_wide;
+#endif
+#define HEX_VECTOR single_wide
 #define HEX_REAL   float
 #include "server/sim/elements/elastic_hex_modes.h"
 
@@ -42,38 +51,35 @@ void pal_hex_single_rotate(pal_elastic_hexes_single *single)
     for (size_t i = 0; i < n && single->rotation; i++) single->rotation[i] = (float)single->cubes->rotation[i];
 }
 
-PAL_INLINE pal_single8 load(const float *at)
+/* 8 numbers of each block */
+PAL_INLINE single_wide load(const float *const at[BLOCKS])
 {
-    return *(const pal_single8_memory *)at;
+#ifdef __AVX512F__
+    return __builtin_shufflevector(*(const pal_single8_memory *)at[0], *(const pal_single8_memory *)at[1], 0, 1, 2, 3,
+                                   4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+#else
+    return *(const pal_single8_memory *)at[0];
+#endif
 }
-PAL_INLINE void add(float *at, pal_single8 a)
+PAL_INLINE void add(float *at, single_wide a, int block)
 {
+#ifdef __AVX512F__
+    *(pal_single8_memory *)at += block == 0 ? __builtin_shufflevector(a, a, 0, 1, 2, 3, 4, 5, 6, 7)
+                                            : __builtin_shufflevector(a, a, 8, 9, 10, 11, 12, 13, 14, 15);
+#else
+    (void)block;
     *(pal_single8_memory *)at += a;
+#endif
 }
 
 /* u = r u, or r' u, for all modes but translation */
-PAL_INLINE void turn(const pal_single8 r[9], bool transposed, pal_single8 u[3][8])
+PAL_INLINE void turn(const single_wide r[9], bool transposed, single_wide u[3][8])
 {
     const int row = transposed ? 1 : 3, column = transposed ? 3 : 1;
     for (int m = 1; m < 8; m++) {
-        const pal_single8 a = u[0][m], b = u[1][m], c = u[2][m];
+        const single_wide a = u[0][m], b = u[1][m], c = u[2][m];
         for (int i = 0; i < 3; i++) u[i][m] = r[row * i] * a + r[row * i + column] * b + r[row * i + 2 * column] * c;
     }
-}
-
-/* u becomes k K u of the eight elements of a block */
-PAL_INLINE void multiply_block(const pal_elastic_hexes_single *single, int block, float k, pal_single8 u[3][8])
-{
-    const float *beta = (const float[]){(float)single->cubes->beta[0], (float)single->cubes->beta[1]};
-    const pal_single8 mu = k * load(single->stiff + 2 * PAL_LANES * block),
-                      lambda = k * load(single->stiff + (2 * block + 1) * PAL_LANES);
-    pal_single8 r[9];
-    for (int i = 0; i < 3; i++) walsh(u[i]);
-    for (int i = 0; i < 9 && single->rotation; i++) r[i] = load(single->rotation + (9 * block + i) * PAL_LANES);
-    if (single->rotation) turn(r, true, u);
-    hex_stress(mu, lambda, beta[0] * mu + beta[1] * lambda, u);
-    if (single->rotation) turn(r, false, u);
-    for (int i = 0; i < 3; i++) unwalsh(u[i]);
 }
 
 typedef struct product {
@@ -83,27 +89,58 @@ typedef struct product {
     float *out;
 } product;
 
-static void multiply_strip(const product *to, int b)
+/* the numbers of blocks at `from`, n [blocks][n][8], at index i */
+PAL_INLINE single_wide load_own(const float *from, const int32_t block[BLOCKS], int n, int i)
 {
-    const int32_t *base = to->single->cubes->simd_blocks.base + 8 * b;
-    const size_t n_slot = (size_t)to->single->n_slot;
-    pal_single8 u[3][8];
-    for (size_t d = 0; d < 3; d++)
-        for (int c = 0; c < 8; c++) u[d][c] = load(to->p + d * n_slot + base[c]);
-    multiply_block(to->single, b, to->k, u);
-    for (size_t d = 0; d < 3; d++)
-        for (int c = 0; c < 8; c++) add(to->out + d * n_slot + base[c], u[d][c]);
+    const float *at[BLOCKS];
+    for (int k = 0; k < BLOCKS; k++) at[k] = from + (n * block[k] + i) * PAL_LANES;
+    return load(at);
 }
 
-static void multiply_loose(const product *to, int b)
+/* u becomes k K u of the elements of the blocks */
+PAL_INLINE void multiply_blocks(const product *to, const int32_t block[BLOCKS], bool turned, single_wide u[3][8])
+{
+    const pal_elastic_hexes_single *single = to->single;
+    const float beta[2] = {(float)single->cubes->beta[0], (float)single->cubes->beta[1]};
+    const single_wide mu = to->k * load_own(single->stiff, block, 2, 0),
+                      lambda = to->k * load_own(single->stiff, block, 2, 1);
+    single_wide r[9];
+    for (int i = 0; i < 3; i++) walsh(u[i]);
+    for (int i = 0; i < 9 && turned; i++) r[i] = load_own(single->rotation, block, 9, i);
+    if (turned) turn(r, true, u);
+    hex_stress(mu, lambda, beta[0] * mu + beta[1] * lambda, u);
+    if (turned) turn(r, false, u);
+    for (int i = 0; i < 3; i++) unwalsh(u[i]);
+}
+
+/* n of the blocks at block, the others are repetitions */
+PAL_INLINE void multiply_strips(const product *to, const int32_t block[BLOCKS], int n, bool turned)
+{
+    const int32_t *base = to->single->cubes->simd_blocks.base;
+    const size_t n_slot = (size_t)to->single->n_slot;
+    single_wide u[3][8];
+    for (size_t d = 0; d < 3; d++)
+        for (int c = 0; c < 8; c++) {
+            const float *at[BLOCKS];
+            for (int k = 0; k < BLOCKS; k++) at[k] = to->p + d * n_slot + base[8 * block[k] + c];
+            u[d][c] = load(at);
+        }
+    multiply_blocks(to, block, turned, u);
+    for (int k = 0; k < n; k++)
+        for (size_t d = 0; d < 3; d++)
+            for (int c = 0; c < 8; c++) add(to->out + d * n_slot + base[8 * block[k] + c], u[d][c], k);
+}
+
+static void multiply_loose(const product *to, int32_t b)
 {
     const int32_t *node = pal_block_nodes(&to->single->cubes->simd_blocks, b);
     const size_t n_slot = (size_t)to->single->n_slot;
-    pal_single8 u[3][8];
+    const int32_t block[2] = {b, b};
+    single_wide u[3][8] = {{{0}}};
     for (size_t d = 0; d < 3; d++)
         for (int c = 0; c < 8; c++)
             for (int l = 0; l < PAL_LANES; l++) u[d][c][l] = to->p[d * n_slot + (size_t)node[PAL_LANES * c + l]];
-    multiply_block(to->single, b, to->k, u);
+    multiply_blocks(to, block, to->single->rotation != NULL, u);
     for (size_t d = 0; d < 3; d++)
         for (int c = 0; c < 8; c++)
             for (int l = 0; l < PAL_LANES; l++) to->out[d * n_slot + (size_t)node[PAL_LANES * c + l]] += u[d][c][l];
@@ -113,12 +150,19 @@ static void multiply_part(void *user, int part)
 {
     const product *to = user;
     const pal_block_rounds *rounds = &to->single->cubes->rounds;
-    const int n_strip = to->single->cubes->simd_blocks.n_strip;
-    for (int k = rounds->first[part]; k < rounds->first[part + 1]; k++)
-        if (rounds->order[k] < n_strip)
-            multiply_strip(to, rounds->order[k]);
+    const int n_strip = to->single->cubes->simd_blocks.n_strip, end = rounds->first[part + 1];
+    for (int k = rounds->first[part], n; k < end; k += n) {
+        int32_t block[BLOCKS];
+        n = 0;
+        while (n < BLOCKS && k + n < end && rounds->order[k + n] < n_strip) block[n] = rounds->order[k + n], n++;
+        for (int i = n; i < BLOCKS && n > 0; i++) block[i] = block[0];
+        if (n == 0)
+            multiply_loose(to, rounds->order[k]), n = 1;
+        else if (to->single->rotation)
+            multiply_strips(to, block, n, true);
         else
-            multiply_loose(to, rounds->order[k]);
+            multiply_strips(to, block, n, false);
+    }
 }
 
 void pal_hex_single_multiply(const pal_elastic_hexes_single *single, pal_team *team, float k, const float *p,
