@@ -1,5 +1,6 @@
 /* Modes of the voxel hexahedra, for vectors HEX_VECTOR of numbers HEX_REAL: included by elastic_hex_simd.h (double) and
- * elastic_hex_single.c (float); include nowhere else.
+ * elastic_hex_single.c (float); include nowhere else;
+ * alone it is the version for single numbers.
  *
  * A cube's corners c are at the signs s_j(c) of the axes j = x, y, z. Its trilinear field is kept as the
  * coefficients of the eight monomials (modes) m = a set of axes, numbered like corners (x = 1, y = 2, z = 4),
@@ -16,6 +17,11 @@
 #ifndef PAL_SIM_ELEMENTS_ELASTIC_HEX_MODES_H
 #define PAL_SIM_ELEMENTS_ELASTIC_HEX_MODES_H
 #include "server/sim/core/simd_blocks.h"
+
+#ifndef HEX_VECTOR
+#define HEX_VECTOR double
+#define HEX_REAL   double
+#endif
 
 PAL_INLINE void walsh_pair(HEX_VECTOR *low, HEX_VECTOR *high)
 {
