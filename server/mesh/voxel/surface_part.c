@@ -1,25 +1,21 @@
 /* Parts of a surface: components over edges that are matched by position, a common orientation, cavities.
  *
- * One hash table over edges joins triangles into parts (any shared edge) and into patches of one orientation (edges of
- * exactly two triangles, union-find with a parity bit). A part that is a closed chain keeps its orientation; others
- * take that of the patches. */
+ * The sides of triangles, sorted by the positions of their ends, join them into parts (any shared edge) and into
+ * patches of one orientation (edges of exactly two triangles, union-find with a parity bit). A part that is a closed
+ * chain keeps its orientation; others take that of the patches. */
 #include "server/mesh/voxel/surface_part.h"
 
 #include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/num/union_find.h"
 
-typedef struct edge_entry {
-    uint64_t key; /* 0: free */
-    int32_t tri[2];
-    int8_t sign[2];
-    uint8_t n; /* 3: three or more */
-} edge_entry;
-
 typedef struct finder {
     const pal_scan_surface *scan;
-    size_t mask;
-    edge_entry *table;
+    int32_t *place; /* of each vertex: the first vertex at its position [n_vertex] */
+    int32_t *tri;   /* places of the corners, oriented as in the file   [n_tri][3] */
+    int32_t *row;   /* sides by the smaller of their places (pal_surface_sides)    */
+    pal_surface_side *side;
+    size_t n_open;         /* edges of one triangle                                             */
     int32_t *joined;       /* union-find of parts   [n_tri]                                     */
     int32_t *patch;        /* union-find of patches [n_tri]                                     */
     uint8_t *reversed_of;  /* orientation against the patch parent; finally against the root */
@@ -44,77 +40,102 @@ static int32_t find_patch(finder *f, int32_t i, uint8_t *reversed)
     return root;
 }
 
-static void add_edge(finder *f, int32_t tri, uint64_t key, int sign)
+/* +1 or -1: the side runs from its smaller place to the larger or back */
+static int side_sign(const finder *f, const pal_surface_side *side)
 {
-    size_t at = key & f->mask;
-    while (f->table[at].key && f->table[at].key != key) at = (at + 1) & f->mask;
-    edge_entry *e = &f->table[at];
-    if (e->n < 2) e->key = key, e->tri[e->n] = tri, e->sign[e->n] = (int8_t)sign;
-    if (e->n < 3) e->n++;
-    pal_union_find_join(f->joined, tri, e->tri[0]);
+    return side->high == f->tri[side->corner] ? -1 : 1;
 }
 
-/* edges of exactly two triangles relate the orientations of these */
-static void join_patches(finder *f)
+/* calls take for the n sides of each edge; a side between equal places is none */
+static void each_edge(finder *f, void *self, void (*take)(finder *f, void *self, const pal_surface_side *side, int n))
 {
-    for (size_t i = 0; i <= f->mask; i++) {
-        const edge_entry *e = &f->table[i];
-        if (e->n != 2) continue;
-        uint8_t reversed_a, reversed_b, differ = e->sign[0] == e->sign[1];
-        int32_t a = find_patch(f, e->tri[0], &reversed_a), b = find_patch(f, e->tri[1], &reversed_b);
-        if (a == b) {
-            if ((reversed_a ^ reversed_b) != differ) f->inconsistent[a] = 1;
-            continue;
+    for (int32_t low = 0; low < f->scan->n_vertex; low++)
+        for (int32_t k = f->row[low], end = k; k < f->row[low + 1]; k = end) {
+            while (end < f->row[low + 1] && f->side[end].high == f->side[k].high) end++;
+            if (f->side[k].high != low) take(f, self, f->side + k, end - k);
         }
-        int32_t low = a < b ? a : b, high = a < b ? b : a;
-        f->patch[high] = low;
-        f->reversed_of[high] = reversed_a ^ reversed_b ^ differ;
-        f->inconsistent[low] |= f->inconsistent[high];
+}
+
+/* an edge joins its triangles to a part; one of exactly two relates their orientations */
+static void join_edge(finder *f, void *self, const pal_surface_side *side, int n)
+{
+    (void)self;
+    const int32_t first = side[0].corner / 3;
+    for (int k = 1; k < n; k++) pal_union_find_join(f->joined, side[k].corner / 3, first);
+    f->n_open += n == 1;
+    if (n != 2) return;
+    uint8_t reversed_a, reversed_b, differ = side_sign(f, &side[0]) == side_sign(f, &side[1]);
+    int32_t a = find_patch(f, first, &reversed_a), b = find_patch(f, side[1].corner / 3, &reversed_b);
+    if (a == b) {
+        if ((reversed_a ^ reversed_b) != differ) f->inconsistent[a] = 1;
+        return;
     }
+    int32_t low = a < b ? a : b, high = a < b ? b : a;
+    f->patch[high] = low;
+    f->reversed_of[high] = reversed_a ^ reversed_b ^ differ;
+    f->inconsistent[low] |= f->inconsistent[high];
+}
+
+/* the first vertex at the position of each; MEMORY */
+static pal_err find_places(finder *f)
+{
+    const pal_scan_surface *scan = f->scan;
+    size_t cap = 16;
+    while (cap < 2 * (size_t)scan->n_vertex) cap *= 2;
+    pal_err err = PAL_ERR_OK;
+    int32_t *seen; /* vertex + 1, 0: free */
+    PAL_ZEROED(&err, seen, cap);
+    PAL_ARRAY(&err, f->place, scan->n_vertex);
+    for (int32_t v = 0; v < scan->n_vertex && !err; v++) {
+        size_t at = scan->hash[v] & (cap - 1);
+        while (seen[at] && scan->hash[seen[at] - 1] != scan->hash[v]) at = (at + 1) & (cap - 1);
+        if (!seen[at]) seen[at] = v + 1;
+        f->place[v] = seen[at] - 1;
+    }
+    return PAL_FREED(err, seen);
 }
 
 static pal_err find_edges(finder *f)
 {
-    size_t n = (size_t)f->scan->n_tri, cap = 16;
-    while (cap < 5 * n) cap *= 2;
-    f->mask = cap - 1;
-    pal_err err = PAL_ERR_OK;
-    PAL_ZEROED(&err, f->table, cap);
+    const size_t n = (size_t)f->scan->n_tri;
+    pal_err err = find_places(f);
+    PAL_ARRAY(&err, f->tri, 3 * n);
     PAL_ARRAY(&err, f->joined, n);
     PAL_ARRAY(&err, f->patch, n);
     PAL_ZEROED(&err, f->reversed_of, n);
     PAL_ZEROED(&err, f->inconsistent, n);
     if (err) return err;
+    for (size_t c = 0; c < 3 * n; c++) f->tri[c] = f->place[f->scan->tri[c]];
+    const pal_surface placed = {.n_vertex = f->scan->n_vertex, .n_tri = f->scan->n_tri, .tri = f->tri};
+    err = pal_surface_sides(&placed, &f->row, &f->side);
+    if (err) f->row = NULL, f->side = NULL;
+    if (err) return err;
     pal_union_find_init(f->joined, f->scan->n_tri);
     pal_union_find_init(f->patch, f->scan->n_tri);
-    for (int32_t t = 0; t < f->scan->n_tri; t++)
-        for (int k = 0; k < 3; k++) {
-            int sign;
-            uint64_t key = pal_scan_edge(f->scan, t, k, &sign);
-            if (key) add_edge(f, t, key, sign);
-        }
-    join_patches(f);
+    each_edge(f, NULL, join_edge);
     return PAL_ERR_OK;
 }
 
-/* boundary of each part as sums of edge hashes, as given and as oriented by its patches */
+/* what decides a part's kind and orientation. Its boundary is counted as given and as oriented by its patches */
 typedef struct chain {
-    uint64_t sum, repaired, odd;
+    bool bounded, bounded_repaired, odd, inconsistent;
     double centre[3], volume;
-    bool inconsistent;
 } chain;
 
-static void add_edges(const pal_scan_surface *scan, int32_t tri, bool reversed_of, chain *c)
+static void count_edge(finder *f, void *self, const pal_surface_side *side, int n)
 {
-    for (int k = 0; k < 3; k++) {
-        int sign;
-        uint64_t h = pal_scan_edge(scan, tri, k, &sign);
-        c->sum += sign > 0 ? h : 0 - h;
-        c->repaired += (sign > 0) != reversed_of ? h : 0 - h;
-        c->odd ^= h;
+    chain *c = (chain *)self + f->scan->part[side->corner / 3];
+    int given = 0, repaired = 0;
+    for (int k = 0; k < n; k++) {
+        uint8_t reversed = 0;
+        const int sign = side_sign(f, &side[k]);
+        if (n != 2) find_patch(f, side[k].corner / 3, &reversed);
+        given += sign, repaired += reversed ? -sign : sign;
     }
-    for (int d = 0; d < 3; d++)
-        for (int k = 0; k < 3; k++) c->centre[d] += pal_scan_corner(scan, (size_t)tri, k)[d];
+    c->bounded |= given != 0;
+    /* a patch that has a common orientation agrees with it at its edges of two */
+    c->bounded_repaired |= repaired != 0 && n != 2;
+    c->odd |= n & 1;
 }
 
 static void reverse_triangle(int32_t *tri)
@@ -142,28 +163,25 @@ typedef struct hole {
     double sum[3];
 } hole;
 
-/* the open edges in the current orientation of their triangles */
-static void list_open(const finder *f, open_edge *out)
+/* appends an open edge in the current orientation of its triangle */
+static void list_open(finder *f, void *self, const pal_surface_side *side, int n)
 {
-    for (size_t i = 0; i <= f->mask; i++) {
-        const edge_entry *e = &f->table[i];
-        int32_t t = e->tri[0];
-        const int32_t *c = f->scan->tri + 3 * (size_t)t;
-        int k = 0, sign;
-        if (e->n != 1) continue;
-        while (k < 2 && pal_scan_edge(f->scan, t, k, &sign) != e->key) k++;
-        *out++ = (open_edge){t, c[k], c[(k + 1) % 3]};
-    }
+    open_edge **to = self;
+    if (n != 1) return;
+    const int32_t t = side->corner / 3, *c = f->scan->tri + 3 * (size_t)t,
+                  opposite = f->tri[3 * (size_t)t + (size_t)((side->corner + 2) % 3)];
+    int k = 0;
+    while (f->place[c[k]] != opposite) k++;
+    *(*to)++ = (open_edge){t, c[(k + 1) % 3], c[(k + 2) % 3]};
 }
 
 /* adds the volumes between the fans that close the holes and the centre of each part to the volumes of the parts;
  * MEMORY */
-static pal_err close_holes(const finder *f, chain *chains)
+static pal_err close_holes(finder *f, chain *chains)
 {
     const pal_scan_surface *scan = f->scan;
-    size_t n_open = 0;
+    const size_t n_open = f->n_open;
     pal_err err = PAL_ERR_OK;
-    for (size_t i = 0; i <= f->mask; i++) n_open += f->table[i].n == 1;
     if (n_open == 0) return PAL_ERR_OK;
     open_edge *open;
     int32_t *root;
@@ -172,7 +190,8 @@ static pal_err close_holes(const finder *f, chain *chains)
     PAL_ARRAY(&err, root, scan->n_vertex);
     PAL_ZEROED(&err, holes, scan->n_vertex);
     if (!err) {
-        list_open(f, open);
+        open_edge *to = open;
+        each_edge(f, &to, list_open);
         pal_union_find_init(root, scan->n_vertex);
     }
     for (size_t i = 0; i < n_open && !err; i++) pal_union_find_join(root, open[i].a, open[i].b);
@@ -201,23 +220,27 @@ static pal_err close_holes(const finder *f, chain *chains)
 static pal_err orient(pal_scan_surface *scan, finder *f, pal_parts *parts, chain *chains)
 {
     uint8_t reversed;
+    each_edge(f, chains, count_edge);
     for (int32_t t = 0; t < scan->n_tri; t++) {
         chain *c = &chains[scan->part[t]];
         c->inconsistent |= f->inconsistent[find_patch(f, t, &reversed)];
-        add_edges(scan, t, reversed, c);
+        const int32_t *a = pal_scan_corner(scan, (size_t)t, 0), *b = pal_scan_corner(scan, (size_t)t, 1),
+                      *e = pal_scan_corner(scan, (size_t)t, 2);
+        for (int d = 0; d < 3; d++) c->centre[d] += (double)a[d] + b[d] + e[d];
         parts->part[scan->part[t]].n_tri++;
     }
     for (int i = 0; i < parts->n; i++) {
         pal_part *p = &parts->part[i];
-        bool closed = chains[i].sum == 0 || (chains[i].repaired == 0 && !chains[i].inconsistent);
-        p->kind = closed ? PAL_PART_CLOSED : chains[i].odd == 0 ? PAL_PART_EVEN : PAL_PART_OPEN;
-        p->coherent = !chains[i].inconsistent;
-        for (int d = 0; d < 3; d++) chains[i].centre[d] /= 3.0 * p->n_tri;
+        chain *c = &chains[i];
+        bool closed = !c->bounded || (!c->bounded_repaired && !c->inconsistent);
+        p->kind = closed ? PAL_PART_CLOSED : c->odd ? PAL_PART_OPEN : PAL_PART_EVEN;
+        p->coherent = !c->inconsistent;
+        for (int d = 0; d < 3; d++) c->centre[d] /= 3.0 * p->n_tri;
     }
     for (int32_t t = 0; t < scan->n_tri; t++) {
         chain *c = &chains[scan->part[t]];
         find_patch(f, t, &reversed);
-        if (reversed && c->sum != 0 && !c->inconsistent) reverse_triangle(scan->tri + 3 * (size_t)t);
+        if (reversed && c->bounded && !c->inconsistent) reverse_triangle(scan->tri + 3 * (size_t)t);
         double p[3][3];
         for (int k = 0; k < 3; k++)
             for (int d = 0; d < 3; d++) p[k][d] = pal_scan_corner(scan, (size_t)t, k)[d] - c->centre[d];
@@ -246,7 +269,7 @@ pal_err pal_parts_find(pal_scan_surface *scan, pal_parts *out)
         PAL_ZEROED(&err, chains, parts.n);
         if (!err) err = orient(scan, &f, &parts, chains);
     }
-    PAL_FREE(f.table, f.joined, f.patch, f.reversed_of, f.inconsistent, chains);
+    PAL_FREE(f.place, f.tri, f.row, f.side, f.joined, f.patch, f.reversed_of, f.inconsistent, chains);
     if (err)
         pal_parts_free(&parts);
     else

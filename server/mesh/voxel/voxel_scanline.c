@@ -21,7 +21,7 @@ static const int ACROSS[3][2] = {{1, 2}, {0, 2}, {0, 1}};
 
 void pal_scan_surface_free(pal_scan_surface *scan)
 {
-    PAL_FREE(scan->point, scan->tri, scan->part);
+    PAL_FREE(scan->point, scan->tri, scan->part, scan->hash);
     memset(scan, 0, sizeof *scan);
 }
 
@@ -46,22 +46,15 @@ static uint64_t hash_pair(uint64_t a, uint64_t b, int *sign)
     return h * 0xC4CEB9FE1A85EC53u;
 }
 
-uint64_t pal_scan_edge(const pal_scan_surface *scan, int32_t tri, int k, int *sign)
-{
-    size_t t = (size_t)tri;
-    return hash_pair(hash_point(pal_scan_corner(scan, t, k)), hash_point(pal_scan_corner(scan, t, k + 1)), sign);
-}
-
-/* sums of edge hashes over all triangles: a closed chain's signed sum is 0, and an even one's exclusive or; hash of
- * each vertex */
-static void find_closed(pal_scan_surface *scan, const uint64_t *hash)
+/* sums of edge hashes over all triangles: a closed chain's signed sum is 0, and an even one's exclusive or */
+static void find_closed(pal_scan_surface *scan)
 {
     uint64_t sum = 0, odd = 0;
     for (size_t t = 0; t < (size_t)scan->n_tri; t++) {
         const int32_t *c = scan->tri + 3 * t;
         for (int k = 0; k < 3; k++) {
             int sign;
-            uint64_t h = hash_pair(hash[c[k]], hash[c[k == 2 ? 0 : k + 1]], &sign);
+            uint64_t h = hash_pair(scan->hash[c[k]], scan->hash[c[k == 2 ? 0 : k + 1]], &sign);
             sum += sign > 0 ? h : 0 - h;
             odd ^= h;
         }
@@ -75,18 +68,17 @@ pal_err pal_scan_drop_copies(pal_scan_surface *scan)
     size_t n = (size_t)scan->n_tri, cap = 16;
     pal_scan_surface fewer = *scan;
     pal_err err = PAL_ERR_OK;
-    uint64_t *hash, *seen; /* of vertices; of triangles so far, 0: free */
+    uint64_t *seen; /* hashes of the triangles so far, 0: free */
     while (cap < 2 * n) cap *= 2;
     PAL_ARRAY(&err, fewer.tri, 3 * n);
-    PAL_ARRAY(&err, hash, scan->n_vertex);
     PAL_ZEROED(&err, seen, cap);
-    if (err) return PAL_FREED(err, fewer.tri, hash, seen);
-    for (size_t v = 0; v < (size_t)scan->n_vertex; v++) hash[v] = hash_point(scan->point + 3 * v);
+    if (err) return PAL_FREED(err, fewer.tri, seen);
     fewer.n_tri = 0;
     for (size_t t = 0; t < n; t++) {
         const int32_t *c = scan->tri + 3 * t;
         /* the same for the three corners in any order */
-        uint64_t a = hash[c[0]], b = hash[c[1]], e = hash[c[2]], key = (a + b + e) ^ (a ^ b ^ e) * 0x9E3779B97F4A7C15u;
+        uint64_t a = scan->hash[c[0]], b = scan->hash[c[1]], e = scan->hash[c[2]];
+        uint64_t key = (a + b + e) ^ (a ^ b ^ e) * 0x9E3779B97F4A7C15u;
         key += !key;
         size_t at = key & (cap - 1);
         while (seen[at] && seen[at] != key) at = (at + 1) & (cap - 1);
@@ -94,9 +86,9 @@ pal_err pal_scan_drop_copies(pal_scan_surface *scan)
         seen[at] = key;
         memcpy(fewer.tri + 3 * (size_t)fewer.n_tri++, c, 3 * sizeof *c);
     }
-    find_closed(&fewer, hash);
+    if (fewer.n_tri < scan->n_tri) find_closed(&fewer);
     bool better = fewer.even || !scan->even;
-    PAL_FREE(hash, seen, better ? scan->tri : fewer.tri);
+    PAL_FREE(seen, better ? scan->tri : fewer.tri);
     if (better) *scan = fewer;
     return PAL_ERR_OK;
 }
@@ -106,12 +98,10 @@ pal_err pal_scan_snap(const pal_surface *surface, const double low[3], double h,
     size_t n_vertex = (size_t)surface->n_vertex, n_tri = (size_t)surface->n_tri;
     pal_scan_surface scan = {.n_vertex = surface->n_vertex};
     pal_err err = PAL_ERR_OK;
-    uint64_t *hash;
     PAL_ARRAY(&err, scan.point, 3 * n_vertex);
     PAL_ARRAY(&err, scan.tri, 3 * n_tri);
-    PAL_ARRAY(&err, hash, n_vertex);
+    PAL_ARRAY(&err, scan.hash, n_vertex);
     if (err) {
-        free(hash);
         pal_scan_surface_free(&scan);
         return err;
     }
@@ -123,7 +113,7 @@ pal_err pal_scan_snap(const pal_surface *surface, const double low[3], double h,
             double g = (x[k] - low[k]) * scale + 0.5;
             p[k] = g > -1e9 && g < 1e9 ? (int32_t)floor(g) : INT32_MIN;
         }
-        hash[v] = hash_point(p);
+        scan.hash[v] = hash_point(p);
     }
     for (size_t t = 0; t < n_tri; t++) {
         const int32_t *c = surface->tri + 3 * t;
@@ -132,8 +122,7 @@ pal_err pal_scan_snap(const pal_surface *surface, const double low[3], double h,
         if (!finite) continue;
         memcpy(scan.tri + 3 * (size_t)scan.n_tri++, c, 3 * sizeof *c);
     }
-    find_closed(&scan, hash);
-    free(hash);
+    find_closed(&scan);
     *out = scan;
     return PAL_ERR_OK;
 }

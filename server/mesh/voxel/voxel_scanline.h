@@ -13,6 +13,7 @@ typedef struct pal_scan_surface {
     int32_t *point; /* [n_vertex][3]                                         */
     int32_t *tri;   /* [n_tri][3]                                            */
     int32_t *part;  /* part of each triangle [n_tri], or NULL: all part 0    */
+    uint64_t *hash; /* of each vertex by its position [n_vertex]             */
     bool closed;    /* as a chain: every edge runs equally often both ways   */
     bool even;      /* every edge has an even number of triangles            */
 } pal_scan_surface;
@@ -28,8 +29,6 @@ static inline const int32_t *pal_scan_corner(const pal_scan_surface *scan, size_
 {
     return scan->point + 3 * (size_t)scan->tri[3 * tri + (size_t)(k % 3)];
 }
-/* hash of the edge from corner k to the next; *sign is +1 or -1 by its direction; collapsed edges give 0 */
-uint64_t pal_scan_edge(const pal_scan_surface *scan, int32_t tri, int k, int *sign);
 
 typedef struct pal_crossing {
     int32_t place; /* first voxel of the row whose centre lies behind the crossing */

@@ -98,7 +98,9 @@ void pal_body_measure_density(const pal_body *body, double *mass_kg, double *vol
     for (int e = 0; e < n; e++) {
         const int32_t *corner = (own ? body->element : body->tets->tet) + (size_t)n_corner * (size_t)e;
         const double filled = pal_body_element_volume_m3(body, corner) * (body->fill ? (double)body->fill[e] : 1);
-        for (int c = 0; c < n_corner; c++) volume_m3[corner[c]] += filled * pal_body_corner_share(n_corner, c);
+        for (int c = 0; c < n_corner; c++)
+            volume_m3[corner[c]] += filled * (body->own_corner ? pal_body_tet_share(body->own_corner[e], c)
+                                                               : pal_body_corner_share(n_corner, c));
     }
     for (int i = 0; i < body->n_node; i++) mass_kg[i] += body->node_mass_kg[i];
 }

@@ -142,6 +142,7 @@ typedef struct pal_body {
      * [n_element][n_corner] */
     const int32_t *element;
     int n_element, n_corner;
+    const int8_t *own_corner;   /* corner with PAL_OWN_CORNER_MASS of each tetrahedron, -1: none; NULL: equal parts */
     const float *fill;          /* share of material in each element, or tetrahedron where element is NULL; NULL: 1 */
     pal_node_order *node_order; /* memory order of the nodes for kernels; NULL: none made        */
     struct pal_active_nodes *active_nodes; /* packed working arrays (active_nodes.h); NULL: none made       */
@@ -225,6 +226,11 @@ double pal_body_element_volume_m3(const pal_body *body, const int32_t *corner);
 static inline double pal_body_corner_share(int n_corner, int corner)
 {
     return n_corner < 10 ? 1.0 / n_corner : corner < 4 ? 1.0 / 36 : 4.0 / 27;
+}
+/* share of a tetrahedron's mass at a corner, where own is the corner that it has for itself in its voxel, -1: none */
+static inline double pal_body_tet_share(int own, int corner)
+{
+    return own < 0 ? 0.25 : corner == own ? PAL_OWN_CORNER_MASS : (1 - PAL_OWN_CORNER_MASS) / 3;
 }
 /* Density of a body whose mass is lumped from elements, as the hook `measure` adds it: mass and filled volume of each
  * node. [sim] */

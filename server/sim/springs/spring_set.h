@@ -112,8 +112,11 @@ PAL_INLINE double pal_spring_run(const pal_spring_set *set, pal_node_order *node
     pal_v8 f[PAL_CORNERS - 1][3], min = {1, 1, 1, 1, 1, 1, 1, 1};
     const double *p[PAL_CORNERS][3];
     for (int b = 0; b < n_strip; b++) {
-        const int32_t *base = set->simd_blocks.base + n_corner * b;
-        for (int c = 0; c < n_corner; c++) p[c][0] = x + base[c], p[c][1] = y + base[c], p[c][2] = z + base[c];
+        int32_t base[PAL_CORNERS]; /* a copy, which the stores below cannot change */
+        for (int c = 0; c < n_corner; c++) {
+            base[c] = set->simd_blocks.base[n_corner * b + c];
+            p[c][0] = x + base[c], p[c][1] = y + base[c], p[c][2] = z + base[c];
+        }
         kernel(p, pal_load8(set->w + PAL_LANES * b), k * pal_load8(set->q + PAL_LANES * b), f, &min);
         pal_v8 sum[3] = {f[0][0], f[0][1], f[0][2]};
         for (int c = 2; c < n_corner; c++)

@@ -20,7 +20,7 @@ static void gives_tissue_exactly_the_opposite_force_and_its_torque(void)
     tool_scene s;
     REQUIRE(ball_scene(&s, 8, true, 2, 0.008, 15) && tool_scene_open(&s));
     double worst_force = 0, worst_torque = 0, max_N = 0;
-    for (int i = 0; i < 60; i++) {
+    for (int i = 0, n_sub = 0; i < 60; i++) {
         double down = 0.0003 * i, z = 0.058 - down;
         move_tool(&s, 0, 0.006, -0.003, z, false);
         CHECK_INT(pal_world_step(s.world, s.scene->step_s), 0);
@@ -31,14 +31,18 @@ static void gives_tissue_exactly_the_opposite_force_and_its_torque(void)
         /* without friction every force passes through the sphere's centre */
         pal_cross3(wanted, tool->force_N, tool->here_m);
         for (int c = 0; c < 3; c++) worst_force = fmax(worst_force, fabs(load[c] + tool->force_N[c]));
-        /* deeper than that some fans are folded, and their turning is left out */
-        if (size > 0 && down < 0.013) worst_torque = fmax(worst_torque, pal_dist3(torque, wanted) / (size * 0.05));
+        /* where the number of sub-steps changes they are not equally long; deeper than that some fans are folded, and
+         * their turning is left out */
+        const bool equal = pal_world_substeps(s.world) == n_sub;
+        n_sub = pal_world_substeps(s.world);
+        if (size > 0 && equal && down < 0.013)
+            worst_torque = fmax(worst_torque, pal_dist3(torque, wanted) / (size * 0.05));
         max_N = fmax(max_N, size);
     }
     printf("  force up to %.3g N, off by %.2g N, torque off by %.2g of F R\n", max_N, worst_force, worst_torque);
     CHECK(max_N > 0.5);
     CHECK_LE(worst_force, 1e-9 * max_N);
-    CHECK_LE(worst_torque, 1e-5);
+    CHECK_LE(worst_torque, 1e-8);
     tool_scene_close(&s);
 }
 

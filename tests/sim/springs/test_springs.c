@@ -1,6 +1,7 @@
 /* Forces: what must hold for every FORCE component, looped over effect_list.h so that a new effect is covered, and what
  * paper B's springs promise. Rows are made by the plan of a scene that asks for all of them. */
 #include "server/base/vec3.h"
+#include "server/mesh/volume/hexes.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/plan/plan.h"
 #include "server/sim/world/world.h"
@@ -178,6 +179,48 @@ static void chooses_half_the_stable_substep_or_less(void)
         CHECK_LE(0.15 * stable, chosen);
     }
     bench_close(&b);
+}
+
+/* sub-step that the springs of a box allow, and its mass and moments of it about the axes; voxels: the mesh knows that
+ * it is of voxels */
+static bool lump_box(bool voxels, double *limit_s, double moment[10])
+{
+    bench b;
+    memset(&b, 0, sizeof b);
+    if (box_make(6, 5, 7, 0.01, &b.box) || (voxels && pal_hexes_find(&b.box.tets, &b.box.hexes, &diag))) return false;
+    b.scene = box_scene(&b.box, false, false);
+    b.scene->body[0].material.poisson = 0.45;
+    b.arena = pal_arena_create(1 << 20, true);
+    if (pal_plan_build(b.scene, b.arena, &diag, &b.plan)) return false;
+    b.body = &b.plan.body[0];
+    memset(moment, 0, 10 * sizeof *moment);
+    for (int i = 0; i < b.body->n_dof; i++) {
+        const double m = b.body->mass_kg[i], *x = b.body->x_rest + 3 * i;
+        moment[0] += m;
+        for (int c = 0; c < 3; c++) {
+            moment[1 + c] += m * x[c] / 0.05;
+            for (int d = 0; d <= c; d++) moment[4 + c * (c + 1) / 2 + d] += m * x[c] * x[d] / 0.0025;
+        }
+    }
+    const pal_component *solve = &b.plan.component[b.plan.first[PAL_STAGE_SOLVE][0]];
+    pal_step step = {.body = b.body,
+                     .force = b.plan.component + b.plan.first[PAL_STAGE_FORCE][0],
+                     .n_force = b.plan.n_of[PAL_STAGE_FORCE][0]};
+    *limit_s = solve->effect->bounds.limit(solve->self, &step);
+    pal_hexes_free(&b.box.hexes);
+    bench_close(&b);
+    return true;
+}
+
+/* Masses of voxels allow the longer sub-step, and a body turns and bends as with a quarter of each tetrahedron at its
+ * corners: mass, centre and second moments of every voxel are the same, so those of the body are to rounding */
+static void masses_of_voxels_allow_longer_substeps_and_keep_moments(void)
+{
+    double quarter_s, voxel_s, quarter[10], voxel[10];
+    REQUIRE(lump_box(false, &quarter_s, quarter) && lump_box(true, &voxel_s, voxel));
+    printf("  sub-step %.4g ms by quarters, %.4g ms by voxels\n", 1e3 * quarter_s, 1e3 * voxel_s);
+    CHECK_LE(1.2 * quarter_s, voxel_s);
+    for (int k = 0; k < 10; k++) CHECK_NEAR(voxel[k], quarter[k], 1e-12 * quarter[0]);
 }
 
 static void a_breathing_tetrahedron_has_the_analytic_period(void)
@@ -443,6 +486,7 @@ int main(void)
     RUN(internal_components_have_no_net_force_or_torque);
     RUN(forces_are_the_gradient_of_their_energy);
     RUN(chooses_half_the_stable_substep_or_less);
+    RUN(masses_of_voxels_allow_longer_substeps_and_keep_moments);
     RUN(a_breathing_tetrahedron_has_the_analytic_period);
     RUN(a_scaled_tetrahedron_has_the_analytic_energy_and_virial);
     RUN(keeps_momentum_over_10000_substeps);
