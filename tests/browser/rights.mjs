@@ -33,6 +33,10 @@ await run(async () => {
     );
     check("nor sees buttons of tools and of the simulation", offered.length === 0, offered.join(" "));
     check("a trainee cannot pause", await until(() => disabled(tim, "pause")));
+    check(
+        "and is told nothing about its ticket, which allows what the page asks for",
+        await tim.evaluate(() => document.getElementById("notice").hidden),
+    );
     check("but holds a tool", (await until(() => tim.evaluate(() => window.palpate.state.ownTool + 1))) > 0);
     check("an instructor can", !(await disabled(ada, "pause")));
 

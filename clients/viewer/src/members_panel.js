@@ -170,7 +170,7 @@ export class MembersPanel {
             this.orders.unshift({
                 id,
                 name,
-                text: what.filter(Boolean).join(" "),
+                text: what.filter(Boolean).join(" ").replace(/:$/, ""),
                 numbers: `${target} ${text}`.trim(),
                 at,
             });

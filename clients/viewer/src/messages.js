@@ -252,7 +252,8 @@ export class Messages {
         if (!hello) return;
         document.title = `${hello.title} · Palpate`;
         htmlById("title").textContent = hello.title;
-        htmlById("about-source").textContent = hello.organ;
+        htmlById("about-source").textContent =
+            hello.organ && textOf("about.source", { source: hello.organ.replace(/\.$/, "") });
         htmlById("accuracy").textContent = hello.accuracy ?? "";
         htmlById("accuracy").hidden = !hello.accuracy;
     }
