@@ -107,7 +107,8 @@ static pal_err main_open_device(bridge *b, pal_diagnostic *diag)
     pal_servo_options *o = &b->net_options.servo;
     PAL_TRY(main_find_device(b, id, sizeof id, diag));
     const int error = o->backend->open(&o->device, id, &o->info);
-    return error < 0 ? PAL_REFUSE(diag, "%s", o->backend->strerror(o->device, error)) : PAL_ERR_OK;
+    return error < 0 ? PAL_REFUSE(diag, "--device %s: %s", b->device, o->backend->strerror(o->device, error))
+                     : PAL_ERR_OK;
 }
 
 /* place and axes of the workspace, as far as they are known before hello */

@@ -65,7 +65,7 @@ void pal_preflight_log(const pal_preflight *preflight, const char *scene)
             pal_log(PAL_LOG_WARN, "preflight", "%s: body %s: element %s locks at Poisson's ratio %.4g, %s does not",
                     scene, body->name, body->locks, body->poisson, body->instead);
     }
-    pal_log(n_weak > 0 ? PAL_LOG_WARN : PAL_LOG_INFO, "preflight",
+    pal_log(n_weak > 0 ? PAL_LOG_WARN : PAL_LOG_DEBUG, "preflight",
             "%s: %d sub-step%s a step, condition %.2g, %.1f MB, %d weak elements and nodes%s", scene, n_sub,
             n_sub == 1 ? "" : "s", condition, 1e-6 * (double)preflight->n_byte, n_weak,
             n_weak > 0 ? " (palpate plan lists them)" : "");

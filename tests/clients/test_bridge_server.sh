@@ -81,6 +81,10 @@ check "nobody at the address is a failure" $? == 1
 check "said in one line" "$(wc -l <"$work/nobody.err")" == 1
 timeout 20 "$bin/palpate-bridge" --device nothing:x >/dev/null 2>&1
 check "an unknown back end is refused" $? == 1
+timeout 20 "$bin/palpate-bridge" --device virtual:foo >/dev/null 2>"$work/foo.err"
+check "an unknown virtual device is named, with those there are" "$(grep -c 'virtual:foo: no such .* touch, premium' "$work/foo.err")" == 1
+timeout 20 "$bin/palpate-bridge" --hand nobody >/dev/null 2>"$work/hand.err"
+check "an unknown hand is told by its flag" "$(grep -c -e --hand "$work/hand.err")" == 1
 check "the list of devices names the virtual ones" "$("$bin/palpate-bridge" --list-devices | grep -c omega3)" == 1
 check "the doctor runs the servo for a second" "$(timeout 20 "$bin/palpate-bridge" --doctor | grep -c 'lateness p50')" == 1
 finish
