@@ -96,6 +96,9 @@ anneal two 2
 check "the same seed gave another scene" same one/s.json again/s.json
 check "two workers gave another scene" same one/s.json two/s.json
 check "the mesh differs" same one/s.palmesh two/s.palmesh
+# shellcheck disable=SC2086
+run calibrate "$bar" --case bend $small --evaluations 2 --quiet -o named/scene.json
+check "a scene.json is not named after its folder" has named/scene.json '"name":[[:space:]]*"named"'
 end
 
 # ---- ends ----
