@@ -246,7 +246,7 @@ static void main_stop(bridge *b, pal_err err, const char *text, bridge_end *end)
     if (err)
         snprintf(end->reason, sizeof end->reason, "%s", text[0] ? text : pal_err_text(err));
     else if (!end->counts.joined)
-        snprintf(end->reason, sizeof end->reason, "no server at %.100s: %.60s", b->net_options.server,
+        snprintf(end->reason, sizeof end->reason, "no server at %.100s: %.100s", b->net_options.server,
                  end->counts.reason[0] ? end->counts.reason : "no answer");
 }
 
