@@ -61,7 +61,7 @@ await run(async () => {
     check("all see who paused", /^Tim\s*pause/.test(orders), orders);
     const state = await until(
         () => text(eve, "state-text"),
-        (now) => now.startsWith("paused"),
+        (now) => now.startsWith("paused by"),
     );
     check("in the state of the simulation too", state === "paused by Tim", state);
     await ada.evaluate(() => document.getElementById("orders").scrollIntoView());
@@ -80,6 +80,13 @@ await run(async () => {
     );
     check("who is removed is told by whom", gone.includes("Ada has removed you"), gone);
     await tim.screenshot({ path: `${pictures}/rights_removed.png` });
+
+    const odd = await browser.newPage({ viewport: size });
+    await odd.goto(`${place}?role=admin&name=Odd`);
+    await odd.waitForFunction(() => window.palpate?.state.status);
+    const answer = await until(() => text(odd, "notice"));
+    check("a role that does not exist is no message that the server cannot read", /only watch/.test(answer), answer);
+    await odd.close();
 
     // a server that stands still: the page says so, dims the old picture, and takes it back
     const before = Date.now();

@@ -1,5 +1,5 @@
 // Estimates of the error in words: lengths, times, alternatives, what a switch did. Pure.
-import { decimal, language, text as textOf } from "./text.js";
+import { decimal, isTextKey, language, text as textOf } from "./text.js";
 
 /**
  * @typedef {import("./control_table.js").Estimate} Estimate
@@ -51,6 +51,12 @@ export const plainLabel = (label) =>
         .replaceAll("_", " ")
         .replace(/\b(\d+) voxels\b/, (all, n) => textOf("accuracy.label.voxels", { n }))
         .replace(/\b([\d.]+) ms\b/, (all, ms) => textOf("accuracy.label.step", { ms: decimal(ms) }));
+
+/** what a neighbour changes; other words of the server stay @param {string} parameter */
+export const parameterText = (parameter) => {
+    const key = `accuracy.parameter.${parameter}`;
+    return isTextKey(key) ? textOf(key) : parameter;
+};
 
 const percent = (/** @type {number} */ value) =>
     `${value < 99.5 ? decimal(value.toPrecision(2)) : Math.round(value)} %`;

@@ -38,6 +38,10 @@ export class Controls {
         buttonById("panel-toggle").onclick = () => this.togglePanel();
         buttonById("help-open").onclick = () => this.openHelp();
         this.addKeys();
+        // who has clicked goes on with the keys of the page: Space pauses, and does not click once more
+        document.addEventListener("click", ({ detail, target }) => {
+            if (detail > 0 && target instanceof HTMLElement && target.matches("button, [type=checkbox]")) target.blur();
+        });
         window.addEventListener("resize", () => this.place());
     }
 

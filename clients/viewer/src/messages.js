@@ -193,7 +193,7 @@ export class Messages {
         const playback = message.playback?.[0];
         this.page.playback.show(playback, state.may("steer"));
         this.showHint();
-        const text = playback
+        const text = playback?.plays
             ? playbackText(playback, message.paused)
             : message.paused
               ? this.pausedBy

@@ -15,8 +15,7 @@ export function timeText(s) {
 }
 
 /** what the state of the connection says about a recording @param {Playback} playback @param {boolean} paused */
-export function playbackText({ plays, ended, speed }, paused) {
-    if (!plays) return textOf("state.live");
+export function playbackText({ ended, speed }, paused) {
     if (ended) return textOf("playback.end");
     if (paused) return textOf("playback.paused");
     return speed === 1 ? textOf("playback.plays") : textOf("playback.plays_at", { speed });
