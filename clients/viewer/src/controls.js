@@ -40,7 +40,9 @@ export class Controls {
         this.addKeys();
         // who has clicked goes on with the keys of the page: Space pauses, and does not click once more
         document.addEventListener("click", ({ detail, target }) => {
-            if (detail > 0 && target instanceof HTMLElement && target.matches("button, [type=checkbox]")) target.blur();
+            const clicked = detail > 0 && target instanceof HTMLElement ? target : null;
+            if (clicked?.matches("button, [type=checkbox]") && !clicked.closest("dialog, [role=dialog]"))
+                clicked.blur();
         });
         window.addEventListener("resize", () => this.place());
     }
