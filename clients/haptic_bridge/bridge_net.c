@@ -6,6 +6,7 @@
 #include "palpate_haptic_config_t.h"
 #include "palpate_haptic_event_t.h"
 #include "palpate_haptic_status_t.h"
+#include "palpate_session_status_t.h"
 #include "server/base/clock.h"
 #include "server/base/log.h"
 #include "server/base/vec3.h"
@@ -145,10 +146,23 @@ static void ws_state(void *user, pal_link_state state, int code, const char *rea
     pal_log(PAL_LOG_WARN, "server", "connection lost: %d %s", code, reason);
 }
 
+/* which session is there, for who waits for another: "PREFIX/SESSION/STATUS" */
+static void note_session(pal_bridge_net *n, const char *channel)
+{
+    const size_t n_prefix = strlen(pal_lcm_link_prefix(n->lcm)) + 1, n_all = strlen(channel), n_end = strlen("/STATUS");
+    if (n->count.joined || n_all <= n_prefix + n_end || strcmp(channel + n_all - n_end, "/STATUS")) return;
+    const char *session = channel + n_prefix;
+    const int n_session = (int)(n_all - n_prefix - n_end);
+    if (strlen(n->o.session) != (size_t)n_session || strncmp(n->o.session, session, (size_t)n_session))
+        snprintf(n->count.reason, sizeof n->count.reason, "not session %.24s, but %.*s is there (--session)",
+                 n->o.session, n_session < 24 ? n_session : 24, session);
+}
+
 /* the session's name is a regular expression in the subscription */
 static bool lcm_wants(void *user, const char *channel)
 {
-    const pal_bridge_net *n = user;
+    pal_bridge_net *n = user;
+    note_session(n, channel);
     return pal_lcm_channel_index(channel, pal_lcm_link_prefix(n->lcm), n->o.session, "HMODEL") == n->o.tool;
 }
 
@@ -361,7 +375,8 @@ static pal_err net_open_lcm(pal_bridge_net *n, pal_diagnostic *diag)
     char channel[PAL_LCM_CHANNEL_MAX + 1];
     PAL_TRY(pal_lcm_link_open(n->loop, &lcm, &events, n, diag, &n->lcm));
     snprintf(channel, sizeof channel, ".*/HMODEL/%d", n->o.tool);
-    return pal_lcm_link_subscribe(n->lcm, channel, palpate_haptic_model_t_get_type_info());
+    PAL_TRY(pal_lcm_link_subscribe(n->lcm, channel, palpate_haptic_model_t_get_type_info()));
+    return pal_lcm_link_subscribe(n->lcm, ".*/STATUS", palpate_session_status_t_get_type_info());
 }
 
 pal_err pal_bridge_net_open(pal_link_loop *loop, pal_servo *servo, pal_servo_thread *thread,

@@ -198,22 +198,25 @@ static bool virtual_option(virtual_state *s, const char *key, const char *value)
     return false;
 }
 
-static bool virtual_parse(virtual_state *s, const char *id)
+enum { UNKNOWN_DEVICE = -2, UNKNOWN_OPTION = -5 };
+
+/* 0, or the error */
+static int virtual_parse(virtual_state *s, const char *id)
 {
     char text[256];
-    if (strlen(id) >= sizeof text) return false;
+    if (strlen(id) >= sizeof text) return UNKNOWN_OPTION;
     strcpy(text, id[0] ? id : "touch");
     char *rest = NULL, *word = strtok_r(text, ",", &rest);
     for (size_t i = 0; i < sizeof virtual_devices / sizeof virtual_devices[0]; i++)
         if (word && !strcmp(word, virtual_devices[i].id)) s->device = &virtual_devices[i];
-    if (!s->device) return false;
+    if (!s->device) return UNKNOWN_DEVICE;
     while ((word = strtok_r(NULL, ",", &rest))) {
         char *equals = strchr(word, '=');
-        if (!equals) return false;
+        if (!equals) return UNKNOWN_OPTION;
         *equals = 0;
-        if (!virtual_option(s, word, equals + 1)) return false;
+        if (!virtual_option(s, word, equals + 1)) return UNKNOWN_OPTION;
     }
-    return true;
+    return 0;
 }
 
 static uint64_t steps_now(void *user)
@@ -250,9 +253,10 @@ static int virtual_open(void **handle, const char *id, pal_dev_info *out)
     s->clock = &pal_clock_monotonic;
     s->steps = (pal_clock){.now_ns = steps_now, .sleep_until_ns = steps_sleep_until, .user = &s->steps_ns};
     atomic_store(&s->steps_ns, pal_clock_ns());
-    if (!virtual_parse(s, id)) {
+    const int unknown = virtual_parse(s, id);
+    if (unknown) {
         free(s);
-        return -2;
+        return unknown;
     }
     const virtual_device *d = s->device;
     s->buttons = PAL_DEVICE_BUTTON_DEADMAN;
@@ -324,10 +328,15 @@ static int virtual_stop(void *handle)
 static const char *virtual_strerror(void *handle, int error)
 {
     (void)handle;
-    static const char *const text[] = {"ok", "out of memory", "unknown device or option", "no answer from the device",
-                                       "force is not finite"};
+    static const char *const text[] = {
+        "ok",
+        "out of memory",
+        "no such virtual device: touch, premium, omega3, inverse3 or falcon",
+        "no answer from the device",
+        "force is not finite",
+        "the virtual hand does not know this --hand, --script or --options (--help lists them)"};
     if (error > 0) return "motor saturated";
-    return error >= -4 ? text[-error] : "unknown";
+    return error >= UNKNOWN_OPTION ? text[-error] : "unknown";
 }
 
 const pal_haptic_v1 *pal_device_virtual(void)

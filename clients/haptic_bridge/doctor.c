@@ -44,9 +44,9 @@ static int doctor_limits(void)
     getrlimit(RLIMIT_RTPRIO, &priority);
     getrlimit(RLIMIT_MEMLOCK, &locked);
     const bool root = geteuid() == 0, may = root || priority.rlim_cur > FIFO_PRIORITY;
-    int bad = doctor_line(may, "real-time priority: up to %llu%s%s", (unsigned long long)priority.rlim_cur,
-                          root ? " (root)" : "",
-                          may ? "" : "; give your user rtprio 85 in /etc/security/limits.d, then log in again");
+    int bad = root ? doctor_line(true, "real-time priority: any, as root")
+                   : doctor_line(may, "real-time priority: up to %llu%s", (unsigned long long)priority.rlim_cur,
+                                 may ? "" : "; give your user rtprio 85 in /etc/security/limits.d, then log in again");
     const bool all = root || locked.rlim_cur == RLIM_INFINITY;
     bad += doctor_line(all, "locked memory: %s",
                        all ? "without limit" : "limited; give your user memlock unlimited in /etc/security/limits.d");

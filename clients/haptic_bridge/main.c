@@ -107,7 +107,8 @@ static pal_err main_open_device(bridge *b, pal_diagnostic *diag)
     pal_servo_options *o = &b->net_options.servo;
     PAL_TRY(main_find_device(b, id, sizeof id, diag));
     const int error = o->backend->open(&o->device, id, &o->info);
-    return error < 0 ? PAL_REFUSE(diag, "%s", o->backend->strerror(o->device, error)) : PAL_ERR_OK;
+    return error < 0 ? PAL_REFUSE(diag, "--device %s: %s", b->device, o->backend->strerror(o->device, error))
+                     : PAL_ERR_OK;
 }
 
 /* place and axes of the workspace, as far as they are known before hello */
@@ -245,7 +246,7 @@ static void main_stop(bridge *b, pal_err err, const char *text, bridge_end *end)
     if (err)
         snprintf(end->reason, sizeof end->reason, "%s", text[0] ? text : pal_err_text(err));
     else if (!end->counts.joined)
-        snprintf(end->reason, sizeof end->reason, "no server at %.100s: %.60s", b->net_options.server,
+        snprintf(end->reason, sizeof end->reason, "no server at %.100s: %.100s", b->net_options.server,
                  end->counts.reason[0] ? end->counts.reason : "no answer");
 }
 

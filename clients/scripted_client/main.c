@@ -286,13 +286,16 @@ int main(int argc, char **argv)
         {"--slow", "BYTES_S", PAL_FLAG_NUMBER, &base.read_bytes_s, 1, 1e9, "read no faster than this"},
         {"--stall", "S", PAL_FLAG_OPTIONAL, &stall, 0, 0, "read nothing for S seconds (3), then go on"},
     };
-    const pal_flag_table table = {.program = "palpate-client",
-                                  .usage = "URL [flags]",
-                                  .about = "Joins the session at ws://host:port/ws, moves a tool by a script, checks "
-                                           "every frame and measures the time\n"
-                                           "from pose to frame. Exit code 1 when a check failed.\n",
-                                  PAL_FLAGS(flag),
-                                  .operands = {1, 1}};
+    const pal_flag_table table = {
+        .program = "palpate-client",
+        .usage = "URL [flags]",
+        .about = "Joins the session at ws://host:port/ws, moves a tool by a script, checks "
+                 "every frame and measures the time\n"
+                 "from pose to frame. Exit code 1 when a check failed. URL is quoted and has the ticket\n"
+                 "that palpate serve prints: 'http://127.0.0.1:8090/#TICKET'; PALPATE_TICKET may have\n"
+                 "it too, and a server with --open needs none.\n",
+        PAL_FLAGS(flag),
+        .operands = {1, 1}};
     const int code = pal_flags_parse(&table, argc, argv, &common, &base.url, NULL);
     if (code >= 0) return code;
     if (stall) base.stall_s = *stall ? atof(stall) : 3;

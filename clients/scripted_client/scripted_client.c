@@ -475,7 +475,9 @@ static void client_on_state(void *user, pal_link_state state, int code, const ch
 {
     pal_scripted_client *t = user;
     if (state != PAL_LINK_LOST && state != PAL_LINK_ENDED) return;
-    snprintf(t->result.closed, sizeof t->result.closed, "%d %.150s", code, reason);
+    char *text = t->result.closed;
+    const int n = code ? snprintf(text, sizeof t->result.closed, "%d ", code) : 0; /* 0: nothing was closed */
+    snprintf(text + n, sizeof t->result.closed - (size_t)n, "%.150s", reason);
     if (state == PAL_LINK_ENDED) {
         t->ended = true;
         client_fault(t, PAL_FAULT_CLOSED, "%d %.120s", code, reason);

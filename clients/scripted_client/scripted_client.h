@@ -35,7 +35,7 @@
     X(FIELD, "a field is not what was asked for")                                                                      \
     X(TOPOLOGY_DELTA, "a topology delta does not fit or comes without its frame")                                      \
     X(ASSET, "an asset is missing, damaged or not what its name says")                                                 \
-    X(CLOSED, "the server closed the connection for a fault of ours")
+    X(CLOSED, "the server refused the client")
 typedef enum pal_fault {
 #define X(code, text) PAL_FAULT_##code,
     PAL_FAULT_TABLE(X)

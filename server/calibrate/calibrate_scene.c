@@ -38,14 +38,18 @@ double pal_calibrate_mean(const pal_calibrate_run *run, const pal_calibration_va
     return n > 0 ? sum / n : NAN;
 }
 
-/* "/a/Gear 2.json" -> "gear_2": a valid name for a scene and its mesh */
+/* "/a/Gear 2.json" and "/a/Gear 2/scene.json" -> "gear_2": a valid name for a scene and its mesh */
 static void name_of(const char *path, char out[PAL_NAME])
 {
-    char stem[PAL_CALIBRATE_PATH];
-    const char *slash = strrchr(path, '/');
-    snprintf(stem, sizeof stem, "%s", slash ? slash + 1 : path);
-    char *dot = strrchr(stem, '.');
-    if (dot && dot > stem) *dot = 0;
+    char text[PAL_CALIBRATE_PATH];
+    snprintf(text, sizeof text, "%s", path);
+    char *slash = strrchr(text, '/'), *stem = slash ? slash + 1 : text;
+    if (slash && !strcmp(stem, "scene.json")) {
+        *slash = 0;
+        char *folder = strrchr(text, '/');
+        stem = folder ? folder + 1 : text;
+    } else if (strrchr(stem, '.'))
+        *strrchr(stem, '.') = 0;
     pal_scene_plain_name(stem, "calibrated", out);
 }
 

@@ -11,6 +11,7 @@
 #include "server/commands/tuning.h"
 #include "server/num/median.h"
 #include "server/scene/json_reader.h"
+#include "server/scene/scene_file.h"
 #include "server/study/tuning.h"
 
 #include <errno.h>
@@ -105,7 +106,7 @@ static bool is_same_file(const char *a, const char *b)
     return !strcmp(real[0], real[1]) && !strcmp(name[0], name[1]);
 }
 
-/* can a file of this name be written? Refused before the search, not after it */
+/* can a file of this name be written? Its folder is made. Refused before the search, not after it */
 static pal_err check_target(const char *flag, const char *path, pal_diagnostic *diag)
 {
     char folder[PAL_CALIBRATE_PATH];
@@ -114,8 +115,7 @@ static pal_err check_target(const char *flag, const char *path, pal_diagnostic *
     const char *slash = strrchr(path, '/');
     if (!pal_json_folder(path, folder, sizeof folder) || !path[0] || (slash && !slash[1]))
         return PAL_REFUSE(diag, "%s: \"%.80s\" is not the name of a file", flag, path);
-    if (stat(folder, &facts) || !S_ISDIR(facts.st_mode))
-        return PAL_REFUSE(diag, "%s: %.200s: there is no folder %.200s", flag, path, folder);
+    PAL_TRY(pal_scene_make_folder(folder, diag));
     if (access(folder, W_OK | X_OK))
         return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %.200s: cannot be written: %s", flag, path, strerror(errno));
     if (!stat(path, &facts) && S_ISDIR(facts.st_mode))

@@ -528,7 +528,7 @@ static const pal_flag flag[] = {
     {"--hold", "PERCENT", PAL_FLAG_NUMBER, &args.hold_percent, 0.1, 100,
      "lowest part of the height that is fixed (5; an open adaptive surface: its open edges)"},
     {"--appearance", PAL_APPEARANCES, PAL_FLAG_WORD, &args.scene.appearance, 0, 0,
-     "what the body looks like in the viewer (its name where it is one of these, else neutral)"},
+     "what the body looks like in the viewer (the one in its name, else neutral)"},
     {"--gravity", NULL, PAL_FLAG_SWITCH, &args.scene.gravity, 0, 0,
      "add gravity (a scanned shape is already in balance with its weight)"},
     {"--name", "NAME", PAL_FLAG_TEXT, &args.name, 0, 0, "name of the scene, a-z 0-9 _ - (from the file name)"},

@@ -6,6 +6,25 @@
 #include <math.h>
 #include <stdio.h>
 
+enum { UNEVEN = 2 }; /* ratio of the sub-steps of two bodies from which it is worth a sentence */
+
+/* what it costs that all bodies take the sub-steps of one; false: nothing that is worth a sentence */
+static bool describe_shared(const pal_preflight *preflight, char line[PAL_PREFLIGHT_LINE])
+{
+    const pal_preflight_body *high = &preflight->body[0], *low = high;
+    for (int b = 1; b < preflight->n_body; b++) {
+        if (preflight->body[b].n_sub > high->n_sub) high = &preflight->body[b];
+        if (preflight->body[b].n_sub < low->n_sub) low = &preflight->body[b];
+    }
+    if (preflight->n_body < 2 || high->n_sub < UNEVEN * low->n_sub) return false;
+    snprintf(
+        line, PAL_PREFLIGHT_LINE,
+        "all bodies take the %d sub-steps of %s, %s alone would take %d: a lower resolution of %s, or model fem for "
+        "it, makes all faster",
+        high->n_sub, high->name, low->name, low->n_sub, high->name);
+    return true;
+}
+
 void pal_preflight_print(const pal_preflight *preflight, double measured_ms)
 {
     printf("\npreflight\n");
@@ -14,6 +33,8 @@ void pal_preflight_print(const pal_preflight *preflight, double measured_ms)
         int n = pal_preflight_describe(&preflight->body[b], line);
         for (int k = 0; k < n; k++) printf("  %s: %s\n", preflight->body[b].name, line[k]);
     }
+    char shared[PAL_PREFLIGHT_LINE];
+    if (describe_shared(preflight, shared)) printf("  %s\n", shared);
     if (isfinite(preflight->predicted_ms))
         printf("  a step under load: %.3g ms predicted, %.3g ms measured here at rest\n", preflight->predicted_ms,
                measured_ms);
@@ -65,7 +86,9 @@ void pal_preflight_log(const pal_preflight *preflight, const char *scene)
             pal_log(PAL_LOG_WARN, "preflight", "%s: body %s: element %s locks at Poisson's ratio %.4g, %s does not",
                     scene, body->name, body->locks, body->poisson, body->instead);
     }
-    pal_log(n_weak > 0 ? PAL_LOG_WARN : PAL_LOG_INFO, "preflight",
+    char shared[PAL_PREFLIGHT_LINE];
+    if (describe_shared(preflight, shared)) pal_log(PAL_LOG_WARN, "preflight", "%s: %s", scene, shared);
+    pal_log(n_weak > 0 ? PAL_LOG_WARN : PAL_LOG_DEBUG, "preflight",
             "%s: %d sub-step%s a step, condition %.2g, %.1f MB, %d weak elements and nodes%s", scene, n_sub,
             n_sub == 1 ? "" : "s", condition, 1e-6 * (double)preflight->n_byte, n_weak,
             n_weak > 0 ? " (palpate plan lists them)" : "");

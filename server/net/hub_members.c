@@ -185,7 +185,7 @@ void pal_hub_join(pal_client *c, const pal_wire_join *wanted)
     if (role < wanted->role && c->id && c->grant.has_ticket)
         pal_hub_refuse(c, "role", "your ticket is for a %s", pal_wire_role_name(role));
     else if (role < wanted->role && c->id)
-        pal_hub_refuse(c, "role", "without a ticket you are a viewer: open an address that the server has printed");
+        pal_hub_refuse(c, "role", "without a ticket you may only watch: use an address that the server has printed");
     if (err && c->id) explain_take(c, wanted->tool, err);
     pal_hub_members_changed(room);
 }

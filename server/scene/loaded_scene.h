@@ -43,10 +43,10 @@ typedef struct pal_surface_scene {
     char axes[PAL_AXES_BYTES]; /* where x, y and z point in the patient, "LPS"; "": as the scan says, if it does */
     bool no_image;             /* of pal_scene_from_surface: leave the images of an OBJ file out */
     pal_image_map *image;      /* becomes where images lie on an OBJ file's surface; NULL: none is shown */
-    const char *appearance;    /* a word of PAL_APPEARANCES; NULL: the name of the file or shape where it is one, else
-                                * plastic for control cells and none for others */
-    double hold;               /* lowest part of the height held in place; 0: 0.05, of cells
-                                * more where that is not an eighth of the control vertices     */
+    const char *appearance; /* a word of PAL_APPEARANCES; NULL: the one in the name of the file or shape, else plastic
+                             * for control cells and none for others */
+    double hold;            /* lowest part of the height held in place; 0: 0.05, of cells
+                             * more where that is not an eighth of the control vertices     */
     bool
         gravity; /* add the effect; a scanned shape is in equilibrium with its weight already, so the default is none */
     bool area_springs; /* add the component face_area; without it edges and volumes take its share */

@@ -190,6 +190,7 @@ static pal_err read_look(const pal_json *at, pal_body_def *body)
     PAL_TRY(pal_json_text(at, "appearance", false, body->appearance, sizeof body->appearance));
     if (body->appearance[0] && pal_flag_word(PAL_APPEARANCES, body->appearance) < 0)
         return pal_json_refuse_key(at, "appearance", "\"%s\" is not one of %s", body->appearance, PAL_APPEARANCES);
+    if (!body->appearance[0]) pal_scene_guess_appearance(body->name, body->appearance);
     PAL_TRY(pal_json_text(at, "colour", false, body->colour, sizeof body->colour));
     if (body->colour[0] && (body->colour[0] != '#' || strspn(digits, "0123456789abcdefABCDEF") != 6))
         return pal_json_refuse_key(at, "colour", "\"%s\" is not a colour as #82352b", body->colour);

@@ -59,6 +59,35 @@ void pal_scene_plain_name(const char *text, const char *otherwise, char out[PAL_
     if (n == 0) snprintf(out, PAL_NAME, "%s", otherwise);
 }
 
+/* length of the word at the head of text, in which a space, '-' or nothing may stand for '_'; 0: it is not there */
+static size_t match_word(const char *text, const char *word, size_t n_word)
+{
+    size_t n = 0;
+    for (size_t k = 0; k < n_word; k++) {
+        if (word[k] == '_' && !strchr("_- ", text[n])) continue;
+        if (word[k] != '_' && tolower((unsigned char)text[n]) != word[k]) return 0;
+        if (!text[n]) return 0;
+        n++;
+    }
+    return isalpha((unsigned char)text[n]) ? 0 : n;
+}
+
+void pal_scene_guess_appearance(const char *name, char out[PAL_APPEARANCE_BYTES])
+{
+    out[0] = 0;
+    for (size_t at = 0; name[at]; at++) {
+        if (at > 0 && isalpha((unsigned char)name[at - 1])) continue;
+        for (const char *word = PAL_APPEARANCES; *word;) {
+            const size_t n = strcspn(word, "|");
+            if (match_word(name + at, word, n)) {
+                snprintf(out, PAL_APPEARANCE_BYTES, "%.*s", (int)n, word);
+                return;
+            }
+            word += n + (word[n] == '|');
+        }
+    }
+}
+
 /* what of a file name may be shown to people */
 static void shown_text(const char *from, char *out, size_t n_byte)
 {
@@ -320,11 +349,9 @@ static pal_err make_body(pal_loaded_scene *loaded, const char *name, const pal_s
         pal_body_default_cells(body, plain, &loaded->mesh[0], cells);
     else
         pal_body_default(body, plain, &loaded->mesh[0]);
-    const char *look = options->appearance                          ? options->appearance
-                       : pal_flag_word(PAL_APPEARANCES, plain) >= 0 ? plain
-                       : cells                                      ? "plastic"
-                                                                    : "";
-    snprintf(body->appearance, sizeof body->appearance, "%.15s", look);
+    pal_scene_guess_appearance(plain, body->appearance);
+    const char *asked = options->appearance ? options->appearance : cells && !body->appearance[0] ? "plastic" : NULL;
+    if (asked) snprintf(body->appearance, sizeof body->appearance, "%.15s", asked);
     if (!options->gravity) leave_gravity_out(body);
     /* as many levels as run in real time; cells that are no hexahedra need one */
     const int n_level = options->n_level                                     ? options->n_level

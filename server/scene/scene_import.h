@@ -31,6 +31,8 @@ pal_err pal_scene_rename(pal_loaded_scene *scene, const char *name, const char *
                          pal_diagnostic *diag);
 /* text -> [a-z0-9_-], at most PAL_NAME - 1 characters; otherwise: where none of them is there */
 void pal_scene_plain_name(const char *text, const char *otherwise, char out[PAL_NAME]);
+/* the first word of PAL_APPEARANCES in a name: "Gall bladder 2" and "gallbladder_ct" are a gall_bladder; "": none */
+void pal_scene_guess_appearance(const char *name, char out[PAL_APPEARANCE_BYTES]);
 
 /* ---- private to this room ---- */
 

@@ -35,24 +35,24 @@ typedef struct column {
 #define AT(member) offsetof(pal_study_point, member)
 static const column columns[] = {
     {"ms", "ms", 8, NUMBER, AT(measured.ms), 1, ITSELF, "%.3f"},
-    {"ms p95", "p95", 8, NUMBER, AT(ms_p95), 1, ITSELF, "%.3f"},
+    {"ms p95", "", 0, NUMBER, AT(ms_p95), 1, ITSELF, "%.3f"},
     {"live", "live", 5, LIVE, 0, 1, ITSELF, ""},
     {"error mm", "", 0, NUMBER, AT(measured.error_m), 1e3, ITSELF, "%.4f"},
-    {"rest RMS mm", "rest RMS", 9, NUMBER, AT(static_rms_m), 1e3, ITSELF, "%.4f"},
-    {"rest mm", "max mm", 9, NUMBER, AT(static_max_m), 1e3, ITSELF, "%.4f"},
-    {"rest RMS %", "RMS %", 7, NUMBER, AT(static_rms_m), 1e2, DISPLACEMENT, "%.2f"},
-    {"rest %", "max %", 7, NUMBER, AT(static_max_m), 1e2, DISPLACEMENT, "%.2f"},
+    {"rest RMS mm", "", 0, NUMBER, AT(static_rms_m), 1e3, ITSELF, "%.4f"},
+    {"rest mm", "rest mm", 8, NUMBER, AT(static_max_m), 1e3, ITSELF, "%.4f"},
+    {"rest RMS %", "", 0, NUMBER, AT(static_rms_m), 1e2, DISPLACEMENT, "%.2f"},
+    {"rest %", "rest %", 6, NUMBER, AT(static_max_m), 1e2, DISPLACEMENT, "%.2f"},
     {"path RMS mm", "", 0, NUMBER, AT(trajectory_rms_m), 1e3, ITSELF, "%.4f"},
-    {"path mm", "path mm", 9, NUMBER, AT(trajectory_max_m), 1e3, ITSELF, "%.4f"},
-    {"force 0 ms RMS %", "F0 %", 6, NUMBER, AT(force_rms_N[0]), 1e2, FORCE, "%.1f"},
+    {"path mm", "path mm", 8, NUMBER, AT(trajectory_max_m), 1e3, ITSELF, "%.4f"},
+    {"force 0 ms RMS %", "", 0, NUMBER, AT(force_rms_N[0]), 1e2, FORCE, "%.1f"},
     {"force 0 ms %", "", 0, NUMBER, AT(force_max_N[0]), 1e2, FORCE, "%.1f"},
-    {"force 50 ms RMS %", "F50 %", 6, NUMBER, AT(force_rms_N[1]), 1e2, FORCE, "%.1f"},
+    {"force 50 ms RMS %", "force %", 7, NUMBER, AT(force_rms_N[1]), 1e2, FORCE, "%.1f"},
     {"force 50 ms %", "", 0, NUMBER, AT(force_max_N[1]), 1e2, FORCE, "%.1f"},
-    {"force 200 ms RMS %", "F200 %", 6, NUMBER, AT(force_rms_N[2]), 1e2, FORCE, "%.1f"},
+    {"force 200 ms RMS %", "", 0, NUMBER, AT(force_rms_N[2]), 1e2, FORCE, "%.1f"},
     {"force 200 ms %", "", 0, NUMBER, AT(force_max_N[2]), 1e2, FORCE, "%.1f"},
     {"force 50 ms, 30 Hz RMS %", "", 0, NUMBER, AT(force_rms_N[3]), 1e2, FORCE, "%.1f"},
     {"force 50 ms, 30 Hz %", "", 0, NUMBER, AT(force_max_N[3]), 1e2, FORCE, "%.1f"},
-    {"nodes", "nodes", 8, COUNT, AT(n_node), 1, ITSELF, "%.0f"},
+    {"nodes", "nodes", 7, COUNT, AT(n_node), 1, ITSELF, "%.0f"},
     {"sub-steps", "steps", 6, COUNT, AT(n_substep), 1, ITSELF, "%.0f"},
     {"made in s", "", 0, NUMBER, AT(prepare_s), 1, ITSELF, "%.2f"},
     {"predicted ms", "", 0, NUMBER, AT(predicted_ms), 1, ITSELF, "%.3f"},
@@ -79,13 +79,46 @@ static const char *reason_of(const pal_study_point *p)
     return p->reason[0] ? p->reason : pal_err_text(p->err);
 }
 
+/* the tolerance of most configurations; 0: none has one */
+static double usual_tolerance(const pal_study *study)
+{
+    double usual = 0;
+    int max = 0;
+    for (int k = 0; k < study->n_point; k++) {
+        double t = study->point[k].measured.configuration.tolerance;
+        int n = 0;
+        for (int i = 0; i < study->n_point; i++) n += study->point[i].measured.configuration.tolerance == t;
+        if (t > 0 && n > max) max = n, usual = t;
+    }
+    return usual;
+}
+
+/* takes the first `part` out of text */
+static void leave_out(char *text, const char *part)
+{
+    char *at = strstr(text, part);
+    if (at) memmove(at, at + strlen(part), strlen(at + strlen(part)) + 1);
+}
+
+/* a configuration without what most of them have, so that a row fits a terminal of 120 columns */
+static const char *row_text(const pal_configuration *configuration, double usual, char out[PAL_CONFIGURATION_TEXT])
+{
+    char tolerance[48];
+    pal_configuration_text(configuration, out);
+    leave_out(out, " corotational");
+    snprintf(tolerance, sizeof tolerance, ", tolerance %g", usual);
+    if (configuration->tolerance == usual) leave_out(out, tolerance);
+    return out;
+}
+
 void pal_study_print(const pal_study_file *file, FILE *to)
 {
+    const double usual = usual_tolerance(&file->study);
     const pal_study *s = &file->study;
     int order[PAL_STUDY_POINTS];
     char text[PAL_CONFIGURATION_TEXT], cell[32];
     fprintf(to, "%s: %s on %s\n", s->name, file->loads, s->machine);
-    fprintf(to, "against %s, itself within %.3g mm; the largest displacement %.4g mm\n", s->reference,
+    fprintf(to, "against %s, itself within %.3g mm;\nthe largest displacement %.4g mm\n", s->reference,
             1e3 * s->reference_m, 1e3 * s->max_m);
     if (!pal_study_trusted(s))
         fprintf(to,
@@ -93,8 +126,8 @@ void pal_study_print(const pal_study_file *file, FILE *to)
                 "as it lies)%s.\n",
                 is_quick(file) ? ", or study it without --quick" : "");
     if (is_quick(file))
-        fputs("Quick: a coarse reference, so errors below that are of chance, and few configurations; for figures to "
-              "be used run it without --quick.\n",
+        fputs("Quick: a coarse reference, so errors below that are of chance, and few configurations;\n"
+              "for figures to be used run it without --quick.\n",
               to);
     fprintf(to, "%1s %3s", "", "row");
     for (int c = 0; c < N_COLUMN; c++)
@@ -107,20 +140,24 @@ void pal_study_print(const pal_study_file *file, FILE *to)
         fprintf(to, "%1s %3d", p->measured.front ? "*" : "", k + 1);
         for (int c = 0; c < N_COLUMN; c++)
             if (columns[c].width > 0) fprintf(to, " %*s", columns[c].width, cell_text(s, p, &columns[c], "-", cell));
-        fprintf(to, "  %s%s%s\n", pal_configuration_text(&p->measured.configuration, text), p->reason[0] ? "; " : "",
-                p->reason);
+        fprintf(to, "  %s\n", row_text(&p->measured.configuration, usual, text));
+        if (p->reason[0]) fprintf(to, "      %s\n", p->reason);
     }
-    fprintf(to,
-            "* the front: nothing else is both cheaper and nearer; an error below the reference's own counts as that. "
-            "ms: for %.3g ms of the body's time, with shorter steps so many of them.\n"
-            "Live: no more than that. Steps: sub-steps of one.\n",
-            1e3 * s->step_s);
+    fprintf(
+        to,
+        "* the front: nothing else is both cheaper and nearer; an error below the reference's own counts as that.\n"
+        "ms: of a step of %.3g ms, or of the shorter ones in it. live: no more than that. steps: sub-steps of one.\n"
+        "rest, path: largest error at rest under load, and on the way there.\n",
+        1e3 * s->step_s);
+    if (usual > 0)
+        fprintf(to, "Tolerance %g unless a row says another; fem is corotational unless it says another law.\n", usual);
     if (s->max_force_N > 0)
-        fprintf(to,
-                "F: difference of the force felt in a press from the reference's, RMS in per cent of its largest, %.3g "
-                "N, with 60 models a second and 0, 50 and 200 ms of round trip. The reference's own changes by %.2g %% "
-                "from a mesh 1.4 times coarser.\n",
-                s->max_force_N, 100 * s->reference_force_N / s->max_force_N);
+        fprintf(
+            to,
+            "force: RMS difference of the force felt in a press, in per cent of the largest, %.3g N, with 60 models a\n"
+            "second and a round trip of 50 ms. The reference's own changes by %.2g %% from a mesh 1.4 times coarser.\n",
+            s->max_force_N, 100 * s->reference_force_N / s->max_force_N);
+    fprintf(to, "The files have all figures.\n");
     for (int k = 0; k < s->n_point; k++) {
         const pal_study_point *p = &s->point[order[k]];
         if (!pal_study_measured(p))
@@ -150,20 +187,6 @@ static void parameters_of(const pal_study *study, const pal_study_point *p, doub
         n += snprintf(out + n, n_byte - (size_t)n, ", 1/%.4g s", 1 / step);
     if (s->tolerance > 0 && s->tolerance != usual && (size_t)n < n_byte)
         snprintf(out + n, n_byte - (size_t)n, ", to %.0e", s->tolerance);
-}
-
-/* the tolerance of most configurations; 0: none has one */
-static double usual_tolerance(const pal_study *study)
-{
-    double usual = 0;
-    int max = 0;
-    for (int k = 0; k < study->n_point; k++) {
-        double t = study->point[k].measured.configuration.tolerance;
-        int n = 0;
-        for (int i = 0; i < study->n_point; i++) n += study->point[i].measured.configuration.tolerance == t;
-        if (t > 0 && n > max) max = n, usual = t;
-    }
-    return usual;
 }
 
 typedef struct series {

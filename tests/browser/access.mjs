@@ -59,6 +59,26 @@ await run(async () => {
     const ada = await open(browser, `http://127.0.0.1:${server.info.port}/`, "Ada", { width: 1280, height: 800 });
     await until(() => ada.evaluate(() => window.palpate.input.enabled));
 
+    // a browser that draws slowly says so, once
+    await ada.evaluate(() => {
+        const notice = document.getElementById("notice");
+        window.noticed = [notice.textContent];
+        new MutationObserver(() => window.noticed.push(notice.textContent)).observe(notice, { childList: true });
+        window.palpate.stage.pace.struggles = true;
+    });
+    const slow = await until(() => ada.evaluate(() => window.noticed.find((n) => n.startsWith("This browser draws"))));
+    check("a browser that draws slowly says so", /pictures a second: \d/.test(slow ?? ""), slow);
+
+    // who has clicked a button goes on with the keys of the page
+    await ada.click("#mesh");
+    await ada.keyboard.press("Space");
+    const paused = await until(() => ada.evaluate(() => window.palpate.state.status?.paused));
+    const meshed = await ada.getAttribute("#mesh", "aria-pressed");
+    check("Space pauses after a click, and does not click once more", paused === true && meshed === "true");
+    await ada.click("#mesh");
+    await ada.keyboard.press("Space");
+    await until(() => ada.evaluate(() => !window.palpate.state.status?.paused));
+
     // the tool by keyboard, without a touch of the mouse
     const rest = await displacement(ada);
     await ada.focus("#view");

@@ -121,12 +121,17 @@ await run(async () => {
         () => playback(ada),
         (p) => p && !p.plays,
     );
-    check("one click goes on live from there", (await text(ada)) === "live" || /of real time/.test(await text(ada)));
-    await ada.click("#pause");
-    await until(
-        () => ada.evaluate(() => window.palpate.state.status?.paused),
-        (p) => p === false,
+    const waits = await until(
+        () => text(ada),
+        (t) => t.startsWith("paused"),
     );
+    check("one click leaves the recording there, and says that the session is paused", /^paused/.test(waits), waits);
+    await ada.click("#pause");
+    const goes = await until(
+        () => text(ada),
+        (t) => t === "live" || /of real time/.test(t),
+    );
+    check("the next one goes on live", goes === "live" || /of real time/.test(goes), goes);
     const hold = await organPixel(ada);
     await ada.mouse.move(hold.x, hold.y);
     await ada.mouse.down();

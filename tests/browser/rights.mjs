@@ -33,6 +33,10 @@ await run(async () => {
     );
     check("nor sees buttons of tools and of the simulation", offered.length === 0, offered.join(" "));
     check("a trainee cannot pause", await until(() => disabled(tim, "pause")));
+    check(
+        "and is told nothing about its ticket, which allows what the page asks for",
+        await tim.evaluate(() => document.getElementById("notice").hidden),
+    );
     check("but holds a tool", (await until(() => tim.evaluate(() => window.palpate.state.ownTool + 1))) > 0);
     check("an instructor can", !(await disabled(ada, "pause")));
 
@@ -57,7 +61,7 @@ await run(async () => {
     check("all see who paused", /^Tim\s*pause/.test(orders), orders);
     const state = await until(
         () => text(eve, "state-text"),
-        (now) => now.startsWith("paused"),
+        (now) => now.startsWith("paused by"),
     );
     check("in the state of the simulation too", state === "paused by Tim", state);
     await ada.evaluate(() => document.getElementById("orders").scrollIntoView());
@@ -76,6 +80,13 @@ await run(async () => {
     );
     check("who is removed is told by whom", gone.includes("Ada has removed you"), gone);
     await tim.screenshot({ path: `${pictures}/rights_removed.png` });
+
+    const odd = await browser.newPage({ viewport: size });
+    await odd.goto(`${place}?role=admin&name=Odd`);
+    await odd.waitForFunction(() => window.palpate?.state.status);
+    const answer = await until(() => text(odd, "notice"));
+    check("a role that does not exist is no message that the server cannot read", /only watch/.test(answer), answer);
+    await odd.close();
 
     // a server that stands still: the page says so, dims the old picture, and takes it back
     const before = Date.now();

@@ -79,8 +79,16 @@ echo "     grasp held: felt $felt N of $given N, largest step $(json max_step_N 
 timeout 20 "$bin/palpate-bridge" --server ws://127.0.0.1:9/ws --seconds 1 --json >"$work/nobody" 2>"$work/nobody.err"
 check "nobody at the address is a failure" $? == 1
 check "said in one line" "$(wc -l <"$work/nobody.err")" == 1
+check "the server's log says when who joined and left" \
+    "$(grep -cE '^[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9:.]+Z info (join: .+ joins ball as member|leave: .+ leaves ball)' "$work/serve.err")" '>=' 2
+timeout 20 "$bin/palpate-client" ws://127.0.0.1:1/ws --seconds 1 >/dev/null 2>"$work/unknown.err"
+check "a client without a server says so, with no number" "$(grep -c 'never joined: Unable' "$work/unknown.err")" == 1
 timeout 20 "$bin/palpate-bridge" --device nothing:x >/dev/null 2>&1
 check "an unknown back end is refused" $? == 1
+timeout 20 "$bin/palpate-bridge" --device virtual:foo >/dev/null 2>"$work/foo.err"
+check "an unknown virtual device is named, with those there are" "$(grep -c 'virtual:foo: no such .* touch, premium' "$work/foo.err")" == 1
+timeout 20 "$bin/palpate-bridge" --hand nobody >/dev/null 2>"$work/hand.err"
+check "an unknown hand is told by its flag" "$(grep -c -e --hand "$work/hand.err")" == 1
 check "the list of devices names the virtual ones" "$("$bin/palpate-bridge" --list-devices | grep -c omega3)" == 1
 check "the doctor runs the servo for a second" "$(timeout 20 "$bin/palpate-bridge" --doctor | grep -c 'lateness p50')" == 1
 finish

@@ -68,6 +68,12 @@ shows "$work/serve.err" $server_job 'another palpate-lcm takes the session ball'
 check "two rigs with the same channels are reported" $? == 0
 stop $fourth
 
+# a bridge that waits for another session is told which one is there
+timeout 60 "$bin/palpate-bridge" --server "$bus" --session nothere --lcm-key "$work/bus.keys" --device "$(device touch)" --seconds 3 \
+    >/dev/null 2>"$work/nothere.err"
+check "a bridge for a session that is not there learns of one that is" \
+    "$(grep -cE 'not session nothere, but [a-z]+ is there' "$work/nothere.err")" == 1
+
 # orders
 reply=$("$order" 60 "$bus" "$sphere" "$work/bus.keys" pause)
 check "a trainee's ticket does not pause" "$(echo "$reply" | grep -c '^refused role pause: only for')" == 1

@@ -82,11 +82,11 @@ end
 
 # ---- the same again ----
 anneal() { # anneal NAME WORKERS
-    mkdir -p "$1"
     # shellcheck disable=SC2086
     run calibrate "$bar" --case bend $small --method annealing --kinematics linear --evaluations 150 --seed 7 \
         --workers "$2" --json -o "$1/s.json"
 }
+# the folders one, again and two are made, as those of prepare and study are
 begin "annealing with one seed writes the same bytes, on one core or two"
 anneal one 1
 check "exit code $code" code_is 0
@@ -96,6 +96,9 @@ anneal two 2
 check "the same seed gave another scene" same one/s.json again/s.json
 check "two workers gave another scene" same one/s.json two/s.json
 check "the mesh differs" same one/s.palmesh two/s.palmesh
+# shellcheck disable=SC2086
+run calibrate "$bar" --case bend $small --evaluations 2 --quiet -o named/scene.json
+check "a scene.json is not named after its folder" has named/scene.json '"name":[[:space:]]*"named"'
 end
 
 # ---- ends ----
@@ -179,7 +182,8 @@ refuse 2 "--grid: is not" "$bar" --case bend --grid 5x5x5x5 -o no.json
 refuse 1 "--grid: 50 x 50 x 50 nodes" "$bar" --case bend --grid 50x50x50 -o no.json
 refuse 1 "is fitted" "$bar" --case bend --verify bend -o no.json
 refuse 1 "stands there twice" "$bar" --case bend,bend -o no.json
-refuse 1 "there is no folder nowhere" "$bar" --case bend -o nowhere/no.json
+: >file
+refuse 1 "file: is there and not a folder" "$bar" --case bend -o file/no.json
 refuse 2 "--budget: 0 is outside" "$bar" --case bend --budget 0 -o no.json
 refuse 2 "--method: \"foo\" is not adjoint or annealing" "$bar" --case bend --method foo -o no.json
 refuse 2 "--kinematics: \"foo\" is not finite or linear" "$bar" --case bend --kinematics foo -o no.json

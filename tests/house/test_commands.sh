@@ -311,6 +311,26 @@ run plan box.obj --json
 check "exit code $code for a surface" code_is 0
 end
 
+begin "plan says that all bodies take the sub-steps of the finest"
+cat >pair.json <<'END'
+{"bodies": [{"name": "large", "surface": "box.obj", "units": "mm", "resolution": 6, "supports": [{"lowest": 0.1}]},
+            {"name": "small", "surface": "box.obj", "units": "mm", "resolution": 18, "supports": [{"lowest": 0.1}]}]}
+END
+run plan pair.json
+check "exit code $code" code_is 0
+check "it does not" has out "all bodies take the [0-9]* sub-steps of small, large alone would take [0-9]*: a lower resolution of small"
+sed 's/: 18/: 6/' pair.json >even.json
+run plan even.json
+check "it does of equal bodies" test "$(grep -c 'all bodies take' out)" -eq 0
+end
+
+begin "a scene without gravity names none"
+check "scene.json does" test "$(grep -c gravity scene/scene.json)" -eq 0
+run prepare box.obj -o heavy --no-tetgen --units mm --gravity
+check "exit code $code" code_is 0
+check "one with gravity does not" has heavy/scene.json '"gravity"'
+end
+
 begin "every command has --help, --version works, no command is usage"
 for command in serve prepare plan replay solve bench; do
     run $command --help

@@ -105,6 +105,7 @@ run study "$beam" --quick --out o
 check "exit code $code" code_is 0
 check "it does not say what it had" has out "$all of $all measured before"
 check "no front" has out "^\*"
+check "a line is too wide for a terminal of 120 columns" test "$(awk 'length > 120' out | wc -l)" -eq 0
 check "does not say that its reference is coarse" has out "^Quick: a coarse reference"
 check "the page does not say so" has o/study.html "a coarse reference"
 check "the study changed" cmp -s o/study.json whole.json

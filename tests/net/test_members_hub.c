@@ -67,7 +67,7 @@ static void a_role_is_what_the_ticket_says(void)
     CHECK_INT(a.last[PAL_CONTROL_HELLO].hello.you_role, PAL_WIRE_ROLE_VIEWER);
     CHECK_INT(a.last[PAL_CONTROL_HELLO].hello.you_tool, PAL_WIRE_TOOL_NONE);
     CHECK_TEXT(a.last[PAL_CONTROL_ERROR].error.text,
-               "without a ticket you are a viewer: open an address that the server has printed");
+               "without a ticket you may only watch: use an address that the server has printed");
     CHECK_INT(b.last[PAL_CONTROL_HELLO].hello.you_role, PAL_WIRE_ROLE_TRAINEE);
     order(&a, "reset", "", ""), order(&a, "pause", "", ""), mem_text(&a, "{\"type\":\"take_tool\",\"tool\":0}");
     mem_pull(&a, 1000);

@@ -99,6 +99,13 @@ check "opens again" waits_for "$work/again" '"port"'
 check "ends on SIGTERM to a thread of a library with 0" ends_with_0 TERM "$work/again" "$(signal_taker)"
 pid=
 
+"$palpate" ticket --keys "$work/tickets" --new-key >/dev/null
+serve "$work/cube.obj" --resolution 5 --config "$(dirname "$0")/../../deploy/palpate.example.json" --keys "$work/tickets" \
+    --record "$work/record" --health 127.0.0.1:0 --json
+check "takes the configuration that the tree has as an example" waits_for "$work/example" '"port"'
+check "ends with 0" ends_with_0 TERM "$work/example"
+pid=
+
 serve "$work/cube.obj" --resolution 5
 check "names the address to open" waits_for "$work/plain" 'palpate: open http://127.0.0.1:'
 check "ends on SIGINT with 0" ends_with_0 INT "$work/plain"

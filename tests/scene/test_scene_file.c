@@ -671,6 +671,26 @@ static void a_shape_as_it_lies_is_pulled_down_only_when_asked(void)
     }
 }
 
+static void a_name_says_what_a_body_looks_like(void)
+{
+    static const char *const name[][2] = {{"stomach_human_11k", "stomach"},
+                                          {"large_intestine", "intestine"},
+                                          {"Gall bladder 2", "gall_bladder"},
+                                          {"gallbladder_ct", "gall_bladder"},
+                                          {"ct-Liver", "liver"},
+                                          {"liver2", "liver"},
+                                          {"delivery", ""},
+                                          {"livers", ""},
+                                          {"gall", ""},
+                                          {"gall_", ""},
+                                          {"", ""}};
+    for (size_t k = 0; k < sizeof name / sizeof name[0]; k++) {
+        char look[PAL_APPEARANCE_BYTES];
+        pal_scene_guess_appearance(name[k][0], look);
+        CHECK_TEXT(look, name[k][1]);
+    }
+}
+
 static void a_body_looks_as_asked_for_or_as_it_is_named(void)
 {
     static const struct {
@@ -709,6 +729,7 @@ int main(void)
     RUN(every_bad_grid_of_springs_has_its_sentence);
     RUN(absent_keys_take_the_defaults);
     RUN(given_keys_arrive);
+    RUN(a_name_says_what_a_body_looks_like);
     RUN(a_body_looks_as_asked_for_or_as_it_is_named);
     RUN(a_saved_scene_loads_to_the_same_world_step_by_step);
     RUN(constants_of_springs_come_back_bit_for_bit);

@@ -97,6 +97,8 @@ function drawPoints(plot, { requested }) {
     return out;
 }
 
+const LABEL_PX = 40; // room for "now" in any language
+
 /** the running configuration @param {Plot} plot */
 function drawLive({ live }) {
     const { left, right, top, bottom } = BOX;
@@ -104,7 +106,13 @@ function drawLive({ live }) {
     if (live.y === null)
         return [
             shape("line", { x1: live.x, x2: live.x, y1: top, y2: bottom, class: "live-line" }),
-            shape("text", { x: live.x + 4, y: top + 9, class: "now" }, textOf("accuracy.mark_now")),
+            live.x < right - LABEL_PX
+                ? shape("text", { x: live.x + 4, y: top + 9, class: "now" }, textOf("accuracy.mark_now"))
+                : shape(
+                      "text",
+                      { x: live.x - 4, y: top + 9, class: "now", "text-anchor": "end" },
+                      textOf("accuracy.mark_now"),
+                  ),
         ];
     // the label stands above or below: neighbours in time step and tolerance lie to the left and right
     const y = live.y + (live.y > top + 24 ? -13 : 22);

@@ -9,6 +9,7 @@ import {
     millimetres,
     neighbourText,
     partsOf,
+    parameterText,
     plainLabel,
     pointText,
     switchText,
@@ -250,7 +251,7 @@ export class AccuracyPanel {
     neighbourButton(estimate, near) {
         const command = this.neighbourCommand(near);
         const button = this.page.createElement("button");
-        const title = Object.assign(this.page.createElement("b"), { textContent: near.parameter });
+        const title = Object.assign(this.page.createElement("b"), { textContent: parameterText(near.parameter) });
         const text = Object.assign(this.page.createElement("span"), { textContent: neighbourText(estimate, near) });
         button.append(title, text);
         button.title = textOf("accuracy.predicted", {

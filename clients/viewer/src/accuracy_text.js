@@ -1,5 +1,5 @@
 // Estimates of the error in words: lengths, times, alternatives, what a switch did. Pure.
-import { text as textOf } from "./text.js";
+import { decimal, isTextKey, language, text as textOf } from "./text.js";
 
 /**
  * @typedef {import("./control_table.js").Estimate} Estimate
@@ -33,10 +33,10 @@ const known = (v) => typeof v === "number" && Number.isFinite(v) && v >= 0;
 export function short(v) {
     if (v === 0) return "0";
     const size = Math.abs(v);
-    if (size >= 1000) return Math.round(v).toLocaleString("en");
+    if (size >= 1000) return Math.round(v).toLocaleString(language);
     if (size >= 100) return v.toFixed(0);
     if (size < 1e-3) return v.toExponential(0).replace("e-", "e−");
-    return String(Number(v.toPrecision(size >= 10 ? 3 : 2)));
+    return decimal(String(Number(v.toPrecision(size >= 10 ? 3 : 2))));
 }
 
 /** @param {number | undefined} m */
@@ -45,10 +45,21 @@ export function millimetres(m) {
     return m !== 0 && m < RESOLUTION_M ? "< 0.001 mm" : `${short(1e3 * m)} mm`;
 }
 
-/** a label of the server without underscores @param {string} label */
-export const plainLabel = (label) => label.replaceAll("_", " ");
+/** a label of the server in words: "tet_springs, 21 voxels, 8.33 ms" @param {string} label */
+export const plainLabel = (label) =>
+    label
+        .replaceAll("_", " ")
+        .replace(/\b(\d+) voxels\b/, (all, n) => textOf("accuracy.label.voxels", { n }))
+        .replace(/\b([\d.]+) ms\b/, (all, ms) => textOf("accuracy.label.step", { ms: decimal(ms) }));
 
-const percent = (/** @type {number} */ value) => `${value < 99.5 ? value.toPrecision(2) : Math.round(value)} %`;
+/** what a neighbour changes; other words of the server stay @param {string} parameter */
+export const parameterText = (parameter) => {
+    const key = `accuracy.parameter.${parameter}`;
+    return isTextKey(key) ? textOf(key) : parameter;
+};
+
+const percent = (/** @type {number} */ value) =>
+    `${value < 99.5 ? decimal(value.toPrecision(2)) : Math.round(value)} %`;
 
 /** a point of the study: cost, error, and the error of the force where it was judged @param {StudyPoint} point */
 export const pointText = (point) =>
@@ -90,7 +101,7 @@ export function errorText(estimate) {
         diagnostic.replace(/([^.])$/, "$1."),
         locking ? textOf("accuracy.locking") : "",
         energy_error_percent !== undefined && error_m !== undefined && error_m >= RESOLUTION_M
-            ? textOf("accuracy.energy", { percent: energy_error_percent.toPrecision(2) })
+            ? textOf("accuracy.energy", { percent: decimal(energy_error_percent.toPrecision(2)) })
             : "",
         force_percent === undefined ? "" : textOf("accuracy.force", { percent: percent(force_percent) }),
     ];
@@ -146,6 +157,6 @@ export function neighbourText(now, to) {
 export function switchText({ text, args = {} }) {
     const { max_move_m, prepare_ms } = args;
     if (max_move_m === undefined || prepare_ms === undefined) return text;
-    const time = prepare_ms < 1000 ? `${prepare_ms.toFixed(0)} ms` : `${(prepare_ms / 1000).toFixed(1)} s`;
+    const time = prepare_ms < 1000 ? `${prepare_ms.toFixed(0)} ms` : `${decimal((prepare_ms / 1000).toFixed(1))} s`;
     return textOf("accuracy.switched", { time, move: millimetres(max_move_m) });
 }

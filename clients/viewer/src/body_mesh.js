@@ -1,5 +1,6 @@
 // One shown part: the geometry of decoded frames, the triangles of a part that adapts, its edges. Only vertices of the
 // triangles shown have meaningful positions.
+import { edgeOpacity, meanEdge } from "./edge_opacity.js";
 import { FieldColours } from "./field_colours.js";
 import { vertexNormals } from "./normals.js";
 import { pickTriangle } from "./picking.js";
@@ -204,6 +205,14 @@ export class BodyMesh {
             });
             this.lines = new THREE.Mesh(this.geometry, material);
             this.lines.frustumCulled = false;
+            const edge = meanEdge(this.rest, this.triangles());
+            const middle = new THREE.Box3().setFromArray(this.rest).getCenter(new THREE.Vector3());
+            const size = new THREE.Vector2();
+            this.lines.onBeforeRender = (renderer, scene, camera) => {
+                const half = renderer.getDrawingBufferSize(size).y / 2;
+                const pixels = edge * half * camera.projectionMatrix.elements[5];
+                material.opacity = LINES.opacity * edgeOpacity(pixels / camera.position.distanceTo(middle));
+            };
             this.scene.add(this.lines);
         }
         if (this.lines) this.lines.visible = on;

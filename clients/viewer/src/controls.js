@@ -38,6 +38,12 @@ export class Controls {
         buttonById("panel-toggle").onclick = () => this.togglePanel();
         buttonById("help-open").onclick = () => this.openHelp();
         this.addKeys();
+        // who has clicked goes on with the keys of the page: Space pauses, and does not click once more
+        document.addEventListener("click", ({ detail, target }) => {
+            const clicked = detail > 0 && target instanceof HTMLElement ? target : null;
+            if (clicked?.matches("button, [type=checkbox]") && !clicked.closest("dialog, [role=dialog]"))
+                clicked.blur();
+        });
         window.addEventListener("resize", () => this.place());
     }
 

@@ -1,5 +1,5 @@
 // The force of the own tool in words. Pure.
-import { text } from "./text.js";
+import { decimal, text } from "./text.js";
 
 const AT_CAP = 0.995; // share of the cap at which the force is the cap
 
@@ -8,4 +8,6 @@ const AT_CAP = 0.995; // share of the cap at which the force is the cap
  * @param {number} force N @param {number | undefined} cap N
  */
 export const forceText = (force, cap) =>
-    cap && force >= AT_CAP * cap ? text("force.limit", { N: Number(cap.toPrecision(3)) }) : `${force.toFixed(2)} N`;
+    cap && force >= AT_CAP * cap
+        ? text("force.limit", { N: decimal(String(Number(cap.toPrecision(3)))) })
+        : `${decimal(force.toFixed(2))} N`;

@@ -58,9 +58,10 @@ export class Layout {
         };
         const [left, right] = [Math.max(...LEFT.map(size)), Math.max(...RIGHT.map(size))];
         const inside = size("inside");
+        const foot = innerHeight - htmlById("tools").getBoundingClientRect().top;
         return across
-            ? { beside: 0, left: 0, right: 0, bottom: Math.max(left, right, inside) }
-            : { beside: left, left: left + inside, right, bottom: 0 };
+            ? { beside: 0, left: 0, right: 0, bottom: Math.max(left, right, inside, foot) }
+            : { beside: left, left: left + inside, right, bottom: foot };
     }
 
     /** does the organ have room beside all panels? Else they are shown one at a time */

@@ -1,6 +1,6 @@
 // The legend: fields, the range of the colour map, its ticks. Pure.
 import { DIVERGING, SEQUENTIAL } from "./colour_maps.js";
-import { text } from "./text.js";
+import { decimal, text } from "./text.js";
 
 const LENGTHS = /** @type {[string, number][]} */ ([
     ["mm", 1e-3],
@@ -119,7 +119,7 @@ export function shareOf(field, low, high) {
 }
 
 /** @param {number} v @param {string} plus */
-const tickText = (v, plus) => (v > 0 ? plus : "") + String(Number(v.toPrecision(4))).replace("-", "−");
+const tickText = (v, plus) => (v > 0 ? plus : "") + decimal(String(Number(v.toPrecision(4))).replace("-", "−"));
 
 /**
  * Five ticks of a range, evenly spaced, all in one unit.

@@ -30,7 +30,7 @@ import { SculptPanel } from "./sculpt_panel.js";
 import { Stage } from "./stage.js";
 import { store, stored } from "./storage.js";
 import { language, text } from "./text.js";
-import { takeTicket } from "./ticket.js";
+import { roleOfTicket, takeTicket } from "./ticket.js";
 import { ToolInput } from "./tool_input.js";
 import { ToolMarks } from "./tool_marks.js";
 import { ViewMenu } from "./view_menu.js";
@@ -203,8 +203,8 @@ function joinOptions() {
     const session = query.get("session");
     const scheme = location.protocol === "https:" ? "wss" : "ws";
     const url = `${scheme}://${location.host}/ws${session ? "?session=" + encodeURIComponent(session) : ""}`;
-    // with a ticket: whatever it allows
-    const role = ROLES.find((known) => known === query.get("role")) ?? (ticket ? "instructor" : "trainee");
+    const role =
+        ROLES.find((known) => known === query.get("role")) ?? (ticket ? roleOfTicket(ticket) : null) ?? "trainee";
     return { url, name: inputById("name").value.trim() || text("people.guest"), role, ticket };
 }
 

@@ -162,7 +162,9 @@ export class MembersPanel {
     takeOrders({ orders }) {
         for (const { id, name, verb, target, text = "", age_s } of orders) {
             const member = text.match(/\bmember (\d+)/)?.[1];
-            const key = `order.${verb}`;
+            // a command that switches something names what it did: .0 off, .1 on
+            const switched = `order.${verb}.${text.match(/\benabled ([01])\b/)?.[1] ?? 1}`;
+            const key = isTextKey(switched) ? switched : `order.${verb}`;
             const did = isTextKey(key) ? textOf(key) : verb.replaceAll("_", " ");
             // a right has no name of its own
             const what = [did, verb === "allow" ? "" : target, member && this.nameOf(Number(member))];
@@ -170,7 +172,7 @@ export class MembersPanel {
             this.orders.unshift({
                 id,
                 name,
-                text: what.filter(Boolean).join(" "),
+                text: what.filter(Boolean).join(" ").replace(/:$/, ""),
                 numbers: `${target} ${text}`.trim(),
                 at,
             });

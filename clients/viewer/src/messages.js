@@ -193,7 +193,7 @@ export class Messages {
         const playback = message.playback?.[0];
         this.page.playback.show(playback, state.may("steer"));
         this.showHint();
-        const text = playback
+        const text = playback?.plays
             ? playbackText(playback, message.paused)
             : message.paused
               ? this.pausedBy
@@ -252,7 +252,8 @@ export class Messages {
         if (!hello) return;
         document.title = `${hello.title} · Palpate`;
         htmlById("title").textContent = hello.title;
-        htmlById("about-source").textContent = hello.organ;
+        htmlById("about-source").textContent =
+            hello.organ && textOf("about.source", { source: hello.organ.replace(/\.$/, "") });
         htmlById("accuracy").textContent = hello.accuracy ?? "";
         htmlById("accuracy").hidden = !hello.accuracy;
     }

@@ -1,6 +1,6 @@
 // What the panel says of the plan and the bodies: components that run and that are disabled, bodies with a remark, what is
 // not computed. Pure.
-import { text } from "./text.js";
+import { decimal, language, text } from "./text.js";
 
 /**
  * @typedef {import("./app_state.js").Plan} Plan
@@ -15,11 +15,13 @@ const BAR_MIN_MS = 0.01; // the full bar stands for at least this: a sleeping pl
 const SHOWN_MIN_MS = 0.0005; // a smaller time is displayed as 0.000
 
 /** digits are grouped from 10,000 on @param {number} n */
-const count = (n) => (n < 10000 ? String(n) : n.toLocaleString("en"));
+const count = (n) => (n < 10000 ? String(n) : n.toLocaleString(language));
 
 /** @param {number} bytes per second */
 export function rateText(bytes) {
-    return bytes >= 1e6 ? (bytes / 1e6).toFixed(2) + " MB/s" : (bytes / 1e3).toFixed(bytes < 1e4 ? 1 : 0) + " kB/s";
+    return decimal(
+        bytes >= 1e6 ? (bytes / 1e6).toFixed(2) + " MB/s" : (bytes / 1e3).toFixed(bytes < 1e4 ? 1 : 0) + " kB/s",
+    );
 }
 
 /**
@@ -85,7 +87,7 @@ export function bodyRemarks(states, parts) {
     return states.map(({ part, frozen = false, asleep, reason, safeguards = 0, safeguard_ms = 0 }) => {
         const lines = frozen ? [reason || text("body.out_of_bounds")] : [];
         if (safeguards) {
-            const ms = safeguard_ms.toFixed(safeguard_ms < 1 ? 3 : 1);
+            const ms = decimal(safeguard_ms.toFixed(safeguard_ms < 1 ? 3 : 1));
             lines.push(text(safeguards === 1 ? "body.safeguard" : "body.safeguards", { n: count(safeguards), ms }));
         }
         const state = frozen ? "stopped" : asleep ? "asleep" : "";

@@ -3,7 +3,7 @@
 import { htmlById, inputById } from "./dom.js";
 import { activeText, barLengths, bodyRemarks, fixedReason, rateText } from "./plan_list.js";
 import { store, stored } from "./storage.js";
-import { isTextKey, language, text as textOf } from "./text.js";
+import { decimal, isTextKey, language, text as textOf } from "./text.js";
 
 /**
  * @typedef {import("./plan_list.js").Component} Component
@@ -22,7 +22,7 @@ const effectName = (name) => {
 };
 
 /** @param {number} slowdown real time over simulated time */
-export const speedText = (slowdown) => textOf("state.speed", { speed: (1 / slowdown).toFixed(2) });
+export const speedText = (slowdown) => textOf("state.speed", { speed: decimal((1 / slowdown).toFixed(2)) });
 
 export class PlanPanel {
     /** @param {Document} page @param {(command: Command) => void} send */
@@ -146,7 +146,7 @@ export class PlanPanel {
      */
     showStatus(status, figures, parts) {
         const { paused, slowdown } = status;
-        const ms = (/** @type {number} */ v, /** @type {number} */ digits) => `${v.toFixed(digits)} ms`;
+        const ms = (/** @type {number} */ v, /** @type {number} */ digits) => `${decimal(v.toFixed(digits))} ms`;
         const speed = paused ? "–" : slowdown <= 1.02 ? textOf("state.real_time") : speedText(slowdown);
         this.figure("details.speed", speed);
         this.figure("details.step_time", ms(status.step_ms, 2));
@@ -166,7 +166,7 @@ export class PlanPanel {
             if (index === null) continue;
             bar.style.width = 100 * (lengths[index] ?? 0) + "%";
             bar.hidden = !lengths[index];
-            value.textContent = (status.component_ms[index] ?? 0).toFixed(3);
+            value.textContent = decimal((status.component_ms[index] ?? 0).toFixed(3));
         }
     }
 

@@ -1,6 +1,6 @@
 // The bar of a recording: where it is, its marks, how fast it plays, and the way to go on live from there.
 import { buttonById, htmlById, inputById, makeOption, selectById } from "./dom.js";
-import { text as textOf } from "./text.js";
+import { decimal, text as textOf } from "./text.js";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
 const STEPS_1_S = 10; // positions of the bar a second
@@ -11,12 +11,11 @@ const STEPS_1_S = 10; // positions of the bar a second
 export function timeText(s) {
     const tenths = Math.round(10 * s);
     const rest = (tenths % 600) / 10;
-    return `${Math.floor(tenths / 600)}:${rest < 10 ? "0" : ""}${rest.toFixed(1)}`;
+    return `${Math.floor(tenths / 600)}:${rest < 10 ? "0" : ""}${decimal(rest.toFixed(1))}`;
 }
 
 /** what the state of the connection says about a recording @param {Playback} playback @param {boolean} paused */
-export function playbackText({ plays, ended, speed }, paused) {
-    if (!plays) return textOf("state.live");
+export function playbackText({ ended, speed }, paused) {
     if (ended) return textOf("playback.end");
     if (paused) return textOf("playback.paused");
     return speed === 1 ? textOf("playback.plays") : textOf("playback.plays_at", { speed });

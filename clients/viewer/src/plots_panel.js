@@ -9,7 +9,7 @@ import { plotData, timeRange, valueRange } from "./plot_axes.js";
 import { toCsv } from "./plot_csv.js";
 import { picturePlots } from "./plot_picture.js";
 import { ENERGIES, LENGTH_MAX_S, PlotSampler, STEP } from "./plot_sampler.js";
-import { text } from "./text.js";
+import { decimal, text } from "./text.js";
 import uPlot from "./uplot.js";
 
 /**
@@ -217,7 +217,7 @@ export class PlotsPanel {
         }
         const time = hovered === null ? this.sampler.ring.lastTime : this.charts[0].plot.data[0][hovered];
         htmlById("plots-time").textContent = Number.isFinite(time)
-            ? text("plots.at_time", { seconds: Number(time).toFixed(2) })
+            ? text("plots.at_time", { seconds: decimal(Number(time).toFixed(2)) })
             : "";
     }
 

@@ -1,5 +1,7 @@
 // A bar of a round length at the depth of the middle of the view, as on a map. Pure but for `show`.
 
+import { decimal } from "./text.js";
+
 const MIN_PX = 60;
 
 /**
@@ -10,7 +12,7 @@ export function scaleOf(pixels) {
     const ten = 10 ** Math.floor(Math.log10(MIN_PX / pixels) + 1e-9);
     const length = [1, 2, 5, 10].map((s) => s * ten).find((m) => m * pixels >= MIN_PX * (1 - 1e-9)) ?? 10 * ten;
     const mm = Number((1e3 * length).toPrecision(1));
-    return { px: Math.round(length * pixels), text: mm < 1000 ? `${mm} mm` : `${mm / 1000} m` };
+    return { px: Math.round(length * pixels), text: decimal(mm < 1000 ? `${mm} mm` : `${mm / 1000} m`) };
 }
 
 /** @param {HTMLElement} bar @param {number} pixels of a metre */

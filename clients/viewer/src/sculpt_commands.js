@@ -1,5 +1,5 @@
 // Commands of sculpting from the settings of the panel and the clicked points; the plane of a cut; answers in words. Pure.
-import { isTextKey, text } from "./text.js";
+import { decimal, isTextKey, text } from "./text.js";
 
 /** @typedef {import("./text.js").TextKey} TextKey */
 /**
@@ -126,7 +126,7 @@ export function boxAround(box, x) {
 /** three digits, in the unit that fits @param {number} pascal */
 function pressureText(pascal) {
     const [unit, size] = pascal >= 1e6 ? ["MPa", 1e6] : pascal >= 1e3 ? ["kPa", 1e3] : ["Pa", 1];
-    return `${Number((pascal / Number(size)).toPrecision(3))} ${unit}`;
+    return decimal(`${Number((pascal / Number(size)).toPrecision(3))} ${unit}`);
 }
 
 /** result of a command in words @param {import("./control_table.js").Answer} answer */

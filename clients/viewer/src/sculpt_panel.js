@@ -13,7 +13,7 @@ import {
     TOOLS,
 } from "./sculpt_commands.js";
 import { refusalText } from "./sculpt_refusals.js";
-import { text } from "./text.js";
+import { decimal, text } from "./text.js";
 
 /** @typedef {import("./sculpt_commands.js").Command} Command */
 /** @typedef {import("./text.js").TextKey} TextKey */
@@ -172,7 +172,7 @@ export class SculptPanel {
 
     showValues() {
         const { distance_m, radius_m, sharpness, pressure_Pa, lift_m } = this.settings();
-        const mm = (/** @type {number} */ m) => (1000 * m).toFixed(1) + " mm";
+        const mm = (/** @type {number} */ m) => decimal((1000 * m).toFixed(1)) + " mm";
         const show = (/** @type {string} */ name, /** @type {string} */ value) => {
             htmlById(`sculpt-${name}-value`, this.page).textContent = value;
             this.slider(name).ariaValueText = value;
@@ -258,7 +258,8 @@ export class SculptPanel {
         const cuts = command.verb === "cut";
         this.slider("cut").disabled = !cuts;
         if (cuts)
-            this.slider("cut").ariaValueText = `${this.axis.value} = ${(1000 * command.args.offset_m).toFixed(1)} mm`;
+            this.slider("cut").ariaValueText =
+                `${this.axis.value} = ${decimal((1000 * command.args.offset_m).toFixed(1))} mm`;
         this.onChange();
         if (this.isBusy()) this.nextCut = command;
         else this.submit(command);

@@ -31,6 +31,11 @@ export function text(key, values = {}) {
     return LANGUAGES[language][key].replace(/\{(\w+)\}/g, (all, name) => String(values[name] ?? all));
 }
 
+const DECIMAL_SIGNS = Object.freeze(/** @type {Record<string, string>} */ ({ de: "," }));
+
+/** a number with the decimal sign of a language @param {string} digits as of toFixed @param {string} [of] */
+export const decimal = (digits, of = language) => digits.replace(".", DECIMAL_SIGNS[of] ?? ".");
+
 /** is there a text of this key? @param {string} key @returns {key is TextKey} */
 export const isTextKey = (key) => Object.hasOwn(ENGLISH, key);
 

@@ -187,6 +187,8 @@ export class ViewMenu {
         const { classList } = document.body;
         classList.toggle("surround-above", stage.paneAt(0, 0).view.kind === "endoscope");
         classList.toggle("surround-below", stage.paneAt(0, innerHeight - 1).view.kind === "endoscope");
+        const hint = htmlById("view-hint");
+        if (!scope && hint.textContent === text("views.endoscope.how")) hint.hidden = true;
         if (!scope) return;
         buttonById("view-angled").setAttribute("aria-pressed", String(scope.pose.angle > 0));
         inputById("view-turn").disabled = scope.pose.angle === 0; // straight optics look the same however they turn

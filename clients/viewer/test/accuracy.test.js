@@ -173,8 +173,11 @@ test("a neighbour is described by its gain and cost", () => {
     assert.equal(neighbourText(now, { ...to, cost_ms: 2, error_m: 1.8e-3 }), "twice the error, 2.4 ms faster");
     assert.equal(neighbourText(now, { ...to, cost_ms: 4.4, error_m: 6.3e-4 }), "30 % less error, as fast");
     assert.equal(neighbourText(now, { ...to, cost_ms: 1, error_m: 9e-3 }), "10 times the error, 3.4 ms faster");
-    assert.equal(neighbourText(now, to), "24 voxels");
-    assert.equal(neighbourText(estimate({ error_m: undefined }), { ...to, cost_ms: 8.5 }), "24 voxels, 4.1 ms slower");
+    assert.equal(neighbourText(now, to), "24 voxels across");
+    assert.equal(
+        neighbourText(estimate({ error_m: undefined }), { ...to, cost_ms: 8.5 }),
+        "24 voxels across, 4.1 ms slower",
+    );
 });
 
 test("errors that are displayed alike are the same", () => {
@@ -262,9 +265,9 @@ test("numbers are short", () => {
 
 test("a point of the study says how far its force is off where that was measured", () => {
     const point = { index: 0, method: "fem", label: "fem 8_voxels", cost_ms: 1.5, error_m: 4e-4 };
-    assert.equal(pointText(point), "fem 8 voxels: 1.5 ms, 0.4 mm");
+    assert.equal(pointText(point), "fem 8 voxels across: 1.5 ms, 0.4 mm");
     assert.equal(
         pointText({ ...point, force_percent: 6.54 }),
-        "fem 8 voxels: 1.5 ms, 0.4 mm, force 6.5 % off at 50 ms",
+        "fem 8 voxels across: 1.5 ms, 0.4 mm, force 6.5 % off at 50 ms",
     );
 });

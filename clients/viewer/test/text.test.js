@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { readFileSync, readdirSync } from "node:fs";
 import { test } from "node:test";
-import { LANGUAGES, chooseLanguage, text } from "../src/text.js";
+import { LANGUAGES, chooseLanguage, decimal, text } from "../src/text.js";
 
 const { en, ...others } = LANGUAGES;
 const folder = new URL("../", import.meta.url);
@@ -32,6 +32,12 @@ test("each key of the page exists, and each text is used", () => {
             used.includes(key) || all.includes(`"${key}"`) || parts.some((part) => key.startsWith(part)),
             `nothing shows "${key}"`,
         );
+});
+
+test("numbers have the decimal sign of the language", () => {
+    assert.equal(decimal("1234.50 ms", "de"), "1234,50 ms");
+    assert.equal(decimal("1234.50 ms", "en"), "1234.50 ms");
+    assert.equal(decimal("12", "de"), "12");
 });
 
 test("the language is the first known one", () => {

@@ -65,7 +65,9 @@ pal_err pal_listener_open(pal_listener *l, const char *ip_text, int *port_out, p
     if (bind(l->fd, &address.any, n) || listen(l->fd, BACKLOG)) {
         if (errno == EADDRINUSE)
             return PAL_REFUSE(
-                diag, "%s is in use by another program; choose another port with --port (0: any free one)", name);
+                diag,
+                "%s is in use, perhaps by another palpate serve; choose another port with --port (0: any free one)",
+                name);
         return PAL_REFUSE(diag, "cannot listen on %s: %s", name, strerror(errno));
     }
     if (getsockname(l->fd, &address.any, &n)) return PAL_ERR_IO;
