@@ -1,6 +1,5 @@
 /* Modes of the voxel hexahedra, for vectors HEX_VECTOR of numbers HEX_REAL: included by elastic_hex_simd.h (double) and
- * elastic_hex_single.c (float); include nowhere else;
- * alone it is the version for single numbers.
+ * elastic_hex_single.c (float), and nowhere else; alone it is the version for one element.
  *
  * A cube's corners c are at the signs s_j(c) of the axes j = x, y, z. Its trilinear field is kept as the
  * coefficients of the eight monomials (modes) m = a set of axes, numbered like corners (x = 1, y = 2, z = 4),
