@@ -114,7 +114,7 @@ PAL_INLINE void multiply_blocks(const product *to, const int32_t block[BLOCKS], 
 }
 
 /* n of the blocks at block, the others are repetitions */
-PAL_INLINE void multiply_strips(const product *to, const int32_t block[BLOCKS], int n, bool turned)
+PAL_INLINE void multiply_slots(const product *to, const int32_t block[BLOCKS], int n, bool turned)
 {
     const int32_t *base = to->single->cubes->simd_blocks.base;
     const size_t n_slot = (size_t)to->single->n_slot;
@@ -159,9 +159,9 @@ static void multiply_part(void *user, int part)
         if (n == 0)
             multiply_loose(to, rounds->order[k]), n = 1;
         else if (to->single->rotation)
-            multiply_strips(to, block, n, true);
+            multiply_slots(to, block, n, true);
         else
-            multiply_strips(to, block, n, false);
+            multiply_slots(to, block, n, false);
     }
 }
 
