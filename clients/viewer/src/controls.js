@@ -51,7 +51,7 @@ export class Controls {
         const { accuracy, fields, input, layout, plots, sculpt, stage, viewMenu } = this.page;
         const keyboard = new KeyboardTool(stage, input, () => {
             htmlById("hint").classList.add("gone");
-            layout.notice(text("hint.keys"), KEYS_MS);
+            layout.notice(text("hint.keys"), KEYS_MS, "calm");
         });
         const actionOf = keyMap(
             {

@@ -94,7 +94,7 @@ export class FieldDisplay {
             this.list.value = chosen;
             this.subscribe(); // parts that have the field only now
         }
-        if (!stays) this.layout.notice(text("fields.gone", { field: titleOf(chosen) }), NOTICE_MS);
+        if (!stays) this.layout.notice(text("fields.gone", { field: titleOf(chosen) }), NOTICE_MS, "calm");
     }
 
     /** @param {Extract<import("./link.js").PageMessage, {type: "field"}>} message */

@@ -71,13 +71,17 @@ export class Layout {
         return !across && innerWidth - left - right >= WIDTH_MIN;
     }
 
-    /** @param {string} text empty hides it @param {number} ms the notice disappears after this time; 0: it stays */
-    notice(text, ms = 0) {
+    /**
+     * @param {string} text empty hides it @param {number} ms the notice disappears after this time; 0: it stays
+     * @param {"alarm" | "calm"} [tone] calm: nothing is wrong
+     */
+    notice(text, ms = 0, tone = "alarm") {
         clearTimeout(this.noticeTimer);
         this.noticeTimer = ms ? window.setTimeout(() => this.notice(""), ms) : 0;
         const element = htmlById("notice");
         // written only when it changes: screen readers read each change
         if (element.textContent !== text) element.textContent = text;
+        element.classList.toggle("calm", tone === "calm");
         element.hidden = !text;
     }
 

@@ -190,6 +190,7 @@ function picture() {
             layout.notice(
                 text("notice.slow_browser", { n: Math.max(1, Math.round(state.figures.fps)) }),
                 SLOW_NOTICE_MS,
+                "calm",
             );
         }
         nDrawn = 0;

@@ -5,7 +5,7 @@ import { componentsOf, idleText } from "./plan_list.js";
 import { effectsText } from "./picture_effects.js";
 import { speedText } from "./plan_panel.js";
 import { playbackText } from "./playback_bar.js";
-import { text as textOf } from "./text.js";
+import { refusalText, text as textOf } from "./text.js";
 import { sameTools } from "./tool_marks.js";
 
 /**
@@ -123,7 +123,7 @@ export class Messages {
             [h?.session, h?.box_min_m, h?.box_max_m, h?.up].join();
         const sameScene = scene(state.hello) === scene(message);
         if (state.hello?.started && message.started !== state.hello.started)
-            this.page.layout.notice(textOf("notice.restarted"), NOTICE_MS);
+            this.page.layout.notice(textOf("notice.restarted"), NOTICE_MS, "calm");
         state.hello = message;
         state.ownId = message.you.id;
         state.ownTool = message.you.tool ?? -1;
@@ -177,6 +177,7 @@ export class Messages {
                 this.page.layout.notice(
                     textOf("notice.reset", { name, target: target || textOf("notice.scene") }),
                     NOTICE_MS,
+                    "calm",
                 );
         }
     }
@@ -229,8 +230,9 @@ export class Messages {
     }
 
     /** @param {Of<"error">} message */
-    error({ code, text }) {
+    error({ code, text: sentence }) {
         const { accuracy, fields, layout, sculpt, state } = this.page;
+        const text = refusalText(code, sentence);
         if (code === "tool_taken") return;
         this.page.playback.answered();
         if (COMMAND_ERRORS.includes(code) && (sculpt.refused(text) || accuracy.refused(text))) return;

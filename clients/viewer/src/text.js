@@ -40,6 +40,17 @@ export const decimal = (digits, of = language) => digits.replace(".", DECIMAL_SI
 export const isTextKey = (key) => Object.hasOwn(ENGLISH, key);
 
 /**
+ * What the server refused: its own sentence, which is English and names what it is about; in another language that of
+ * the code, where there is one, with the server's behind it where it tells more.
+ * @param {string} code @param {string} sentence @param {string} [of] the language
+ */
+export function refusalText(code, sentence, of = language) {
+    const key = `refusal.${code}`;
+    if (of === "en" || !isTextKey(key)) return sentence;
+    return LANGUAGES[of][key].replace("{sentence}", sentence);
+}
+
+/**
  * Texts of the elements of a page: data-text is the key of its text, data-title of its tooltip, data-label of its
  * name for screen readers.
  * @param {Document} page

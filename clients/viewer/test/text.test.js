@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { readFileSync, readdirSync } from "node:fs";
 import { test } from "node:test";
-import { LANGUAGES, chooseLanguage, decimal, text } from "../src/text.js";
+import { LANGUAGES, chooseLanguage, decimal, refusalText, text } from "../src/text.js";
 
 const { en, ...others } = LANGUAGES;
 const folder = new URL("../", import.meta.url);
@@ -32,6 +32,13 @@ test("each key of the page exists, and each text is used", () => {
             used.includes(key) || all.includes(`"${key}"`) || parts.some((part) => key.startsWith(part)),
             `nothing shows "${key}"`,
         );
+});
+
+test("a refusal is the server's own sentence, or one of the user's language", () => {
+    assert.equal(refusalText("muted", "Ada lets you watch only", "en"), "Ada lets you watch only");
+    assert.equal(refusalText("muted", "Ada lets you watch only", "de"), LANGUAGES.de["refusal.muted"]);
+    assert.equal(refusalText("busy", "pause: wait 2 s", "de"), "Der Server ist beschäftigt: pause: wait 2 s");
+    assert.equal(refusalText("verb", "there is no command x", "de"), "there is no command x");
 });
 
 test("numbers have the decimal sign of the language", () => {
