@@ -59,6 +59,16 @@ static pal_err analyse(pal_preconditioner *p, const pal_preconditioner *like, pa
     return err;
 }
 
+/* the factor alone: its pattern is made again where it is wanted, and takes no memory of the body where it is not */
+static pal_err analyse_apart(pal_preconditioner *p)
+{
+    pal_arena *arena = pal_arena_create(1 << 20, true);
+    pal_err err = arena ? analyse(p, NULL, arena) : PAL_ERR_MEMORY;
+    p->blocks = (pal_block_matrix){.n = 0};
+    pal_arena_destroy(arena);
+    return err;
+}
+
 static pal_err make_levels(pal_preconditioner *p, const pal_elastic_hexes *cubes, pal_arena *arena)
 {
     p->levels = PAL_NEW(arena, pal_hex_levels, 1);
@@ -75,7 +85,7 @@ static pal_err choose(pal_preconditioner *p, const pal_elastic_hexes *cubes, pal
         snprintf(p->reason, sizeof p->reason, "it has only %d nodes", body->n_node);
     if (p->reason[0]) return PAL_ERR_OK;
     if (body->n_node < PAL_MULTIGRID_NODES) {
-        PAL_TRY(analyse(p, NULL, arena));
+        PAL_TRY(analyse_apart(p));
         const double entries = (double)pal_cholesky_nonzeros(p->factor), stiff = contrast(cubes);
         snprintf(p->reason, sizeof p->reason,
                  "its factor has %.1f million entries, its stiffest element is %.0f times the "
@@ -135,7 +145,7 @@ pal_err pal_preconditioner_make(const pal_preconditioner_options *options, pal_s
         PAL_TRY(make_pattern(out, like, arena));
         return pal_incomplete_cholesky_make(&out->blocks, system->body->support, arena, &out->incomplete);
     default:
-        return out->factor ? PAL_ERR_OK : analyse(out, like, arena);
+        return out->factor ? make_pattern(out, like, arena) : analyse(out, like, arena);
     }
 }
 
