@@ -280,7 +280,8 @@ int main(int argc, char **argv)
         {"--depth", "M", PAL_FLAG_NUMBER, &base.depth_m, 1e-5, 1, "depth of a press in metres (8 % of the box)"},
         {"--up", "X,Y,Z", PAL_FLAG_VECTOR, base.up, 0, 0, "from which side the organ is touched (0,0,1)"},
         {"--field", "NAME", PAL_FLAG_TEXT, &base.field, 0, 0,
-         "ask for displacement | von_mises | energy | stiffness | strain | distortion | young | density | damping"},
+         "ask for displacement | von_mises | energy | stiffness | strain | distortion | young |\n"
+         "density | damping"},
         {"--sculpt", "FILE", PAL_FLAG_TEXT, &sculpt, 0, 0,
          "give these orders: lines of SECONDS VERB key=value ... [at=top]"},
         {"--slow", "BYTES_S", PAL_FLAG_NUMBER, &base.read_bytes_s, 1, 1e9, "read no faster than this"},

@@ -223,34 +223,64 @@ void pal_node_order_add(pal_node_order *node_order, double *force)
     run_nodes(&(node_pass){.order = node_order, .force = force});
 }
 
-/* layer of each block, -1: it has several; returns the number of layers */
-static int find_layers(const pal_simd_blocks *blocks, const double *x_rest, int n_node, double edge_m,
+/* plane of a node across the shortest axis */
+static int plane_of(const lattice *l, const double *x_rest, int node, double edge_m)
+{
+    const int axis = l->axis[2];
+    return (int)floor((x_rest[3 * (size_t)node + (size_t)axis] - l->low[axis]) / edge_m + 0.5);
+}
+
+/* A kernel adds zeros at the slots of a block's lanes without an element: does any of the block's slots have a node
+ * elsewhere than on the planes of its layer? plane: of each slot, -1: of none */
+static bool strays(const pal_simd_blocks *blocks, int b, int layer, const int32_t *plane)
+{
+    const int32_t *base = blocks->base + blocks->n_corner * b;
+    if (b >= blocks->n_strip) return true;
+    for (int c = 0; c < blocks->n_corner; c++)
+        for (int l = 0; l < PAL_LANES; l++) {
+            const int32_t at = plane[base[c] + l];
+            if (at >= 0 && at != layer && at != layer + 1) return true;
+        }
+    return false;
+}
+
+/* layer of each block, -1: it has several; returns the number of layers, -1: no memory */
+static int find_layers(const pal_simd_blocks *blocks, const pal_node_order *order, const double *x_rest, double edge_m,
                        const int32_t *item, int n_item, int32_t *layer)
 {
     lattice l;
     const int n_block = blocks->n_lane / PAL_LANES;
-    const bool regular = find_lattice(x_rest, n_node, edge_m, &l);
-    const int axis = l.axis[2];
-    for (int b = 0; b < n_block; b++) layer[b] = regular ? -2 : -1;
-    for (int i = 0; i < n_item && regular; i++) {
-        int lowest = INT_MAX, *of = &layer[blocks->place[i] / PAL_LANES];
+    for (int b = 0; b < n_block; b++) layer[b] = -1;
+    if (!find_lattice(x_rest, order->n_node, edge_m, &l)) return 0;
+    int32_t *plane = malloc(sizeof *plane * (size_t)order->n_slot);
+    if (!plane) return -1;
+    for (int i = 0; i < order->n_slot; i++) plane[i] = -1;
+    for (int i = 0; i < order->n_node; i++) plane[order->slot[i]] = plane_of(&l, x_rest, i, edge_m);
+    for (int i = 0; i < n_item; i++) { /* the first element of a block decides, the others agree or stray */
+        int lowest = INT_MAX;
         for (int c = 0; c < blocks->n_corner; c++) {
-            const double at = x_rest[3 * (size_t)item[blocks->n_corner * i + c] + (size_t)axis];
-            const int here = (int)floor((at - l.low[axis]) / edge_m + 0.5);
+            const int here = plane[order->slot[item[blocks->n_corner * i + c]]];
             lowest = here < lowest ? here : lowest;
         }
-        *of = *of == -2 || *of == lowest ? lowest : -1;
+        layer[blocks->place[i] / PAL_LANES] = lowest;
     }
-    return regular ? l.n[axis] : 0;
+    for (int b = 0; b < n_block; b++)
+        if (strays(blocks, b, layer[b], plane)) layer[b] = -1;
+    free(plane);
+    return l.n[l.axis[2]];
 }
 
-pal_err pal_block_rounds_make(const pal_simd_blocks *blocks, const double *x_rest, int n_node, double edge_m,
-                              const int32_t *item, int n_item, pal_arena *arena, pal_block_rounds *out)
+pal_err pal_block_rounds_make(const pal_simd_blocks *blocks, const pal_node_order *order, const double *x_rest,
+                              double edge_m, const int32_t *item, int n_item, pal_arena *arena, pal_block_rounds *out)
 {
     const int n_block = blocks->n_lane / PAL_LANES;
     int32_t *layer = malloc(sizeof *layer * ((size_t)n_block + 1));
     if (!layer) return PAL_ERR_MEMORY;
-    const int n_layer = find_layers(blocks, x_rest, n_node, edge_m, item, n_item, layer);
+    const int n_layer = find_layers(blocks, order, x_rest, edge_m, item, n_item, layer);
+    if (n_layer < 0) {
+        free(layer);
+        return PAL_ERR_MEMORY;
+    }
     *out = (pal_block_rounds){.n_round = 3};
     out->part = PAL_NEW(arena, int32_t, out->n_round + 1);
     out->first = PAL_NEW(arena, int32_t, n_layer + 2);

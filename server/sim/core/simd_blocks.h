@@ -37,8 +37,9 @@ typedef struct pal_simd_blocks {
 
 /* Blocks in parts for several threads. Blocks of different parts of a round share no node, so that the parts of a round
  * run side by side, and rounds one after the other: sums at nodes are in one order whatever the number of threads. On a
- * lattice a part is a layer of cells across its shortest axis, and a round every second layer; blocks of several layers
- * are a round of their own, as is everything on a mesh that is no lattice. */
+ * lattice a part is a layer of cells across its shortest axis, and a round every second layer; blocks that
+ * reach several layers, also with lanes without an element, are a round of their own, as is everything on a mesh that
+ * is no lattice. */
 typedef struct pal_block_rounds {
     int n_round;
     int32_t *part;  /* first part of each round        [n_round + 1]     */
@@ -54,8 +55,8 @@ pal_err pal_simd_blocks_make(const pal_node_order *node_order, int32_t *item, in
 pal_err pal_simd_blocks_make_ordered(const pal_node_order *node_order, const int32_t *item, int n_item, int n_corner,
                                      pal_arena *arena, pal_simd_blocks *out);
 /* item [n_item][n_corner] as in pal_simd_blocks_make_ordered, x_rest [n_node][3]; MEMORY */
-pal_err pal_block_rounds_make(const pal_simd_blocks *blocks, const double *x_rest, int n_node, double edge_m,
-                              const int32_t *item, int n_item, pal_arena *arena, pal_block_rounds *out);
+pal_err pal_block_rounds_make(const pal_simd_blocks *blocks, const pal_node_order *order, const double *x_rest,
+                              double edge_m, const int32_t *item, int n_item, pal_arena *arena, pal_block_rounds *out);
 /* calls piece(user, part) for every part, round by round; team may be NULL */
 void pal_block_rounds_run(const pal_block_rounds *rounds, pal_team *team, void (*piece)(void *user, int part),
                           void *user);

@@ -75,7 +75,7 @@ pal_err pal_hex_make(const pal_hex_options *options, pal_build *build, const cha
     PAL_TRY(pal_simd_blocks_make_ordered(body->node_order, out->hexes->node, out->n_hex, 8, build->arena,
                                          &out->simd_blocks));
     out->n_block = out->simd_blocks.n_lane / PAL_LANES;
-    PAL_TRY(pal_block_rounds_make(&out->simd_blocks, body->x_rest, body->n_node, out->edge_m, out->hexes->node,
+    PAL_TRY(pal_block_rounds_make(&out->simd_blocks, body->node_order, body->x_rest, out->edge_m, out->hexes->node,
                                   out->n_hex, build->arena, &out->rounds));
     out->part_energy_J = PAL_NEW(build->arena, double, out->rounds.part[out->rounds.n_round]);
     if (!out->part_energy_J) return PAL_ERR_MEMORY;
