@@ -228,7 +228,7 @@ async function checkCut(page) {
     await page.screenshot({ path: join(pictures, "look_cut_above.png") });
     check(
         "what a section removes casts no shadow and no occlusion",
-        difference > 0.1 && left < 0.002,
+        difference > 0.05 && left < 0.002,
         `${(100 * left).toFixed(2)} % of the pixels differ from those without the body, ${(100 * difference).toFixed(0)} % with it`,
     );
     await cutAt(0.01);
