@@ -6,8 +6,9 @@
  * and scaled by the tool's ramp.
  *
  * A tool that grasps tissue (tool_grasp) does not push it, because its sphere would act against its own grasp. A
- * tool that appears inside tissue starts at the nearest position outside. A proxy that stays farther than slip_S box
- * diagonals behind its tool for slip_s is reset to the tool's position.
+ * tool that appears inside tissue starts at the nearest position outside, and again when tissue passes it while its
+ * force rises. A proxy that stays farther than slip_S box diagonals behind its tool for slip_s is reset to the tool's
+ * position.
  *
  * Keys: stiffness_Pa_m (0: the regime's), friction (Coulomb, 0), clamp_S (0.02: correction of penetration in 1/60 s,
  * in box diagonals), near_m (0: the larger of a radius and 10 mm; a contact patch is published within it), slip_S
@@ -97,22 +98,39 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
     return PAL_ERR_OK;
 }
 
+/* the contact point p [3] nearest to x and the way out there; true: x is inside tissue */
+static bool is_inside(const pal_push *push, const pal_body *body, const double x[3], double p[3], double normal[3])
+{
+    double out[3];
+    if (!pal_contact_points_nearest(&push->points, body, x, p, normal)) return false;
+    pal_sub3(out, x, p);
+    return pal_dot3(out, normal) <= 0;
+}
+
 /* initial position of the proxy: the tool's own, or the nearest one outside if that is inside tissue */
 static void place_proxy(pal_push *push, pal_tool_contact *h, const pal_body *body, const double at[3], double radius_m)
 {
-    double p[3], out[3], normal[3];
+    double p[3], out[3], normal[3] = {0};
     memset(&h->proxy, 0, sizeof h->proxy);
     pal_copy3(h->proxy.x, at);
     h->active = true, h->time_behind_s = 0;
     if (h->implicit) h->implicit->back_m = 0, pal_copy3(h->implicit->last_m, at);
-    if (!pal_contact_points_nearest(&push->points, body, at, p, normal)) return;
-    pal_sub3(out, at, p);
-    if (pal_dot3(out, normal) > 0) {
+    if (!is_inside(push, body, at, p, normal)) {
+        if (pal_dot3(normal, normal) == 0) return;
+        pal_sub3(out, at, p);
         if (pal_norm3(out) >= MAX_DEPTH_RADII * radius_m) return;
         pal_unit3(normal, out, 0);
     }
     pal_copy3(h->proxy.normal, normal);
     for (int c = 0; c < 3; c++) h->proxy.x[c] = p[c] + radius_m * normal[c];
+}
+
+/* Has tissue passed the proxy? It can while the tool's force rises: tissue that returns from an earlier press is not
+ * held by a weak one, and the tool would stay inside it without effect */
+static bool is_passed(const pal_push *push, const pal_tool_contact *h, const pal_body *body, const pal_tool *tool)
+{
+    double p[3], normal[3];
+    return tool->present && tool->ramp < 1 && is_inside(push, body, h->proxy.x, p, normal);
 }
 
 /* once per step: places the proxy and finds the points that it can reach */
@@ -130,7 +148,7 @@ static void begin_tool(pal_push *push, pal_tool_contact *h, const pal_tool *tool
     pal_sub3(next, tool->requested.position_m, body->offset_m);
     double behind = h->active ? pal_dist3(h->proxy.x, next) : 0;
     h->time_behind_s = behind > push->slip_S * body->length_scale_m ? h->time_behind_s + step_s : 0;
-    if (!h->active) {
+    if (!h->active || is_passed(push, h, body, tool)) {
         double last[3];
         pal_sub3(last, tool->last.position_m, body->offset_m);
         place_proxy(push, h, body, last, tool->radius_m);

@@ -468,6 +468,39 @@ static void a_step_too_long_for_the_finest_level_is_refused_at_load(void)
     }
 }
 
+/* A tool is missing for one step while it presses: tissue returns, and passes the tool while its force rises */
+static void a_press_goes_on_after_a_missing_step(void)
+{
+    shell_scene s;
+    REQUIRE(stomach_make(&s, 3));
+    const double radius_m = 0.0083, deep_m = 0.02;
+    s.scene->tool[0].radius_m = radius_m;
+    const pal_surface *surface = &s.mesh.surface;
+    for (int t = 96; t <= 120; t += 3) {
+        const int32_t *v = surface->tri + (ptrdiff_t)3 * t;
+        double middle[3] = {0}, a[3], b[3], normal[3], p[3], before_N = 0;
+        for (int k = 0; k < 3; k++) pal_axpy3(middle, 1.0 / 3, surface->x + 3 * (size_t)v[k]);
+        pal_sub3(a, surface->x + 3 * (size_t)v[1], surface->x + 3 * (size_t)v[0]);
+        pal_sub3(b, surface->x + 3 * (size_t)v[2], surface->x + 3 * (size_t)v[0]);
+        pal_cross3(normal, a, b);
+        pal_unit3(normal, normal, 0);
+        pal_world_reset(s.world);
+        for (int i = 0; i < 3 * STEP_HZ; i++) {
+            pal_copy3(p, middle);
+            pal_axpy3(p, 1.2 * radius_m - (deep_m + 1.2 * radius_m) * fmin(1, 2.0 * i / STEP_HZ), normal);
+            pose(&s, p, false);
+            if (i == STEP_HZ) {
+                before_N = pal_norm3(tool_of(&s)->force_N);
+                CHECK_INT(pal_world_pose(s.world, 0, NULL), 0);
+            }
+            CHECK_INT(pal_world_step(s.world, 1.0 / STEP_HZ), 0);
+        }
+        CHECK_LE(0.05, before_N);
+        CHECK_LE(0.2 * before_N, pal_norm3(tool_of(&s)->force_N));
+    }
+    shell_scene_close(&s);
+}
+
 int main(void)
 {
     RUN(another_body_is_switched_and_this_one_goes_on);
@@ -476,6 +509,7 @@ int main(void)
     RUN(a_lasting_load_needs_a_node_in_use);
     RUN(frames_follow_the_table_of_triangles_whatever_they_skip);
     RUN(a_pressed_surface_refines_under_the_tool_without_a_kick);
+    RUN(a_press_goes_on_after_a_missing_step);
     RUN(a_grasp_holds_while_tissue_is_pulled_and_refines);
     RUN(a_grasp_on_a_fine_node_goes_on_when_that_is_gone);
     RUN(a_body_that_diverges_stops_at_its_last_good_state);
