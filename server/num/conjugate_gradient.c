@@ -81,7 +81,7 @@ int pal_conjugate_gradient_run(pal_conjugate_gradient *cg, double *x, double tar
     while (done < max && rr > 0 && (done < min || rr > target * target)) {
         cg->precondition(cg->user, cg->r, cg->z);
         double rz = product(cg->team, n, cg->r, cg->z);
-        if (!(rz > 0) || !isfinite(rz)) break;
+        if (!(rz > 0) || !isfinite(rz) || (done >= min && rz <= cg->gain * cg->energy)) break;
         /* z'(r - r of before) / (z'r of before), and r of before is r + alpha q */
         p.beta = done > 0 ? -p.alpha * product(cg->team, n, cg->z, cg->q) / rz_old : 0;
         p.what = DIRECTION;
@@ -94,6 +94,7 @@ int pal_conjugate_gradient_run(pal_conjugate_gradient *cg, double *x, double tar
         if (!(pq > 0) || !isfinite(pq)) break;
         p.alpha = rz / pq;
         rz_old = rz;
+        cg->energy += p.alpha * rz;
         p.what = ADVANCE;
         rr = run_pass(&p, cg->team);
         done++;

@@ -13,7 +13,11 @@ typedef struct pal_conjugate_gradient {
     pal_team *team;    /* threads that share the sums; NULL: the caller's alone. The same bits with any number */
     double *r;         /* in: b - A x for the first guess x, out: of the last [n] */
     double *z, *p, *q; /* work [n]                                                */
-    double residual;   /* out: |r|, Euclidean                                     */
+    /* a search for x'b = x'A x alone, whose error is about r' A^-1 r: it ends once that is below the share `gain` of
+     * `energy` as the preconditioner sees it. energy: in: x'b of the first guess, out: of the last; gain 0: not asked
+     */
+    double gain, energy;
+    double residual; /* out: |r|, Euclidean                                     */
 } pal_conjugate_gradient;
 
 /* Improves x until |r| <= target, with at least `min` (unless r = 0) and at most `max` iterations; stops where a number

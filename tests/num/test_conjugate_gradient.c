@@ -2,6 +2,8 @@
 #include "server/num/conjugate_gradient.h"
 #include "tests/check.h"
 
+#include <string.h>
+
 enum { N = 60 };
 
 typedef struct chain {
@@ -41,7 +43,7 @@ static int solve(chain *c, double target, int min, int max, double *error, doubl
     double w[N], x[N] = {0}, r[N], z[N], p[N], q[N];
     for (int i = 0; i < N; i++) w[i] = 1 + i % 5;
     multiply(c, w, r);
-    pal_conjugate_gradient cg = {N, multiply, precondition, c, NULL, r, z, p, q, -1};
+    pal_conjugate_gradient cg = {N, multiply, precondition, c, NULL, r, z, p, q, 0, 0, -1};
     int n = pal_conjugate_gradient_run(&cg, x, target, min, max);
     *error = 0;
     for (int i = 0; i < N; i++) *error = fmax(*error, fabs(x[i] - w[i]));
@@ -106,9 +108,28 @@ static void stops_where_there_is_no_way_down(void)
     CHECK_INT(solve(&c, 1e-9, 0, 50, &error, &residual), 0);
     CHECK_NEAR(error, 5, 0); /* x is as it was */
     double zero[N] = {0}, x[N] = {0}, z[N], p[N], q[N];
-    pal_conjugate_gradient cg = {N, multiply, precondition, &c, NULL, zero, z, p, q, -1};
+    pal_conjugate_gradient cg = {N, multiply, precondition, &c, NULL, zero, z, p, q, 0, 0, -1};
     CHECK_INT(pal_conjugate_gradient_run(&cg, x, 0, 5, 50), 0);
     CHECK_NEAR(cg.residual, 0, 0);
+}
+
+/* the search for x'b ends at a share of it, from no guess and from a good one */
+static void ends_once_the_energy_is_known(void)
+{
+    double w[N], b[N], x[N] = {0}, r[N], z[N], p[N], q[N];
+    chain c;
+    make(&c, 1, 1);
+    for (int i = 0; i < N; i++) w[i] = 1 + i % 5;
+    multiply(&c, w, b);
+    const double wanted = pal_dot_product(N, w, b);
+    pal_conjugate_gradient cg = {N, multiply, precondition, &c, NULL, r, z, p, q, 1e-3, 0, -1};
+    memcpy(r, b, sizeof r);
+    const int n = pal_conjugate_gradient_run(&cg, x, 0, 1, 50);
+    CHECK_NEAR(cg.energy, pal_dot_product(N, x, b), 1e-9 * wanted);
+    CHECK_NEAR(cg.energy, wanted, 3e-3 * wanted);
+    CHECK(n > 1 && n < 20);
+    /* nothing is left to do */
+    CHECK_INT(pal_conjugate_gradient_run(&cg, x, 0, 0, 50), 0);
 }
 
 static void sums_in_a_fixed_order(void)
@@ -127,6 +148,7 @@ int main(void)
     RUN(gains_from_the_preconditioner);
     RUN(keeps_to_its_budget_and_to_the_least);
     RUN(stops_where_there_is_no_way_down);
+    RUN(ends_once_the_energy_is_known);
     RUN(sums_in_a_fixed_order);
     return check_report();
 }

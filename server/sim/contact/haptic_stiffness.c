@@ -208,11 +208,13 @@ void pal_haptic_stiffness_near(pal_haptic_stiffness *known, pal_contact_group *g
 
 void pal_grasp_compliance_update(pal_grasp_compliance *w, const pal_body *body, const pal_compliance *compliance,
                                  const int32_t *node, const double *weight, int n, const double at_m[3], double min_m,
-                                 pal_arena *scratch)
+                                 double step_s, pal_arena *scratch)
 {
     double unit[3] = {0}, mean[3];
     int axis = w->next;
-    if (!compliance || (w->n_known == 3 && axis == 0 && pal_dist3(w->at_m, at_m) < min_m)) return;
+    w->since_s += step_s;
+    if (!compliance) return;
+    if (w->n_known == 3 && (w->since_s < FOLLOW_S / 3 || (axis == 0 && pal_dist3(w->at_m, at_m) < min_m))) return;
     unit[axis] = 1;
     size_t used = pal_arena_used(scratch);
     double *answer = PAL_NEW(scratch, double, 3 * (size_t)body->n_node);
@@ -223,6 +225,7 @@ void pal_grasp_compliance_update(pal_grasp_compliance *w, const pal_body *body, 
     if (axis == 0) pal_copy3(w->at_m, at_m);
     if (w->n_known == axis) w->n_known++;
     w->next = (axis + 1) % 3;
+    w->since_s = 0;
 }
 
 bool pal_grasp_compliance_series(const pal_grasp_compliance *w, double k_N_m, double K[6])

@@ -70,12 +70,14 @@ typedef struct pal_grasp_compliance {
     double column_m_N[3][3];
     int n_known, next; /* columns */
     double at_m[3];    /* of the tool when the first one was found */
+    double since_s;    /* time since the last one was found */
 } pal_grasp_compliance;
 
-/* the next column, unless all are known and the tool has moved by less than min_m; weight [n] has the sum 1 */
+/* the next column, unless all are known and the tool has moved by less than min_m or they are found more often than in
+ * FOLLOW_S; weight [n] has the sum 1; step_s: time since the last call */
 void pal_grasp_compliance_update(pal_grasp_compliance *w, const pal_body *body, const pal_compliance *compliance,
                                  const int32_t *node, const double *weight, int n, const double at_m[3], double min_m,
-                                 pal_arena *scratch);
+                                 double step_s, pal_arena *scratch);
 /* K of tissue in series with a spring k, as xx xy xz yy yz zz; false: W_g is not known, or is no compliance */
 bool pal_grasp_compliance_series(const pal_grasp_compliance *w, double k_N_m, double K[6]);
 /* rise of the force for each metre that the spring's end leads the tissue; k_guess_N_m until all of W_g is known */

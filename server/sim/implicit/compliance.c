@@ -55,10 +55,12 @@ static bool solve_points(pal_compliance_solver *solver, const pal_body *body, do
     memcpy(known->force, r, pal_body_bytes3(body));
     known->size2 = size2;
     known->used = ++solver->n_call;
+    solver->cg.energy = 0;
     if (share != 0) {
         for (int i = 0; i < n; i++) move_m[i] = share * known->move[i];
         multiply(solver, move_m, solver->cg.q);
         for (int i = 0; i < n; i++) r[i] = body->support[i / 3] ? 0 : r[i] - solver->cg.q[i];
+        solver->cg.energy = pal_dot_product(n, known->force, move_m);
     }
     (void)pal_conjugate_gradient_run(&solver->cg, move_m, PAL_SOLVER_TOLERANCE * sqrt(size2), share == 0,
                                      MAX_ITERATIONS);
@@ -95,6 +97,7 @@ static pal_err make_arrays(pal_compliance_solver *solver, pal_arena *arena)
     for (int k = 0; k < PAL_COMPLIANCE_CACHE && made; k++)
         made = PAL_NEW_DOUBLES(arena, n3, &solver->known[k].force, &solver->known[k].move);
     cg->n = (int)n3;
+    cg->gain = PAL_COMPLIANCE_GAIN;
     cg->multiply = multiply, cg->precondition = precondition, cg->user = solver;
     return made ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
