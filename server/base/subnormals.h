@@ -1,6 +1,5 @@
 /* Numbers below the smallest normal one count as zero between flush and restore: where inertia rules, answers decay
- * from point to point until they would be subnormal, which costs a hundred times a normal number. Thread: any, its own.
- */
+ * from point to point until they would be subnormal, which costs a hundred times a normal number. Thread: its own. */
 #ifndef PAL_BASE_SUBNORMALS_H
 #define PAL_BASE_SUBNORMALS_H
 #ifdef __SSE2__

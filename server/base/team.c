@@ -71,8 +71,7 @@ static inline void pause_core(void)
 #endif
 }
 
-/* watches the team from outside the lock, which it leaves and takes again, while it is held and `run` is its last run
- */
+/* watches the team, outside the lock, which it leaves and takes again, while it is held and `run` is its last run */
 static void watch(pal_team *team, uint64_t run)
 {
     pthread_mutex_unlock(&team->lock);

@@ -1,7 +1,6 @@
 /* A team of threads that works through independent pieces of work in parallel. What piece i computes must depend on i
  * alone, never on the worker or on the order: then the result is the same for any number of cores. Workers treat
- * subnormal numbers as the caller does (subnormals.h). Thread: one caller
- * at a time. */
+ * subnormal numbers as the caller does (subnormals.h). Thread: one caller at a time. */
 #ifndef PAL_BASE_TEAM_H
 #define PAL_BASE_TEAM_H
 #include "server/base/err.h"

@@ -1,7 +1,7 @@
 /* `palpate bench organ [SURFACE.ply]`: finite-element organs of growing size, live under a pull that is switched on and
  * off, by each preconditioner. The voxels of a closed surface, or of a computed organ; its lowest 12 % are held, E
  * 20 kPa, nu 0.45; the nodes within a fifth of the organ's length of its highest one are pulled sideways. Medians over
- * steps, one thread. */
+ * steps: the processor's time of the calling thread, also with several. */
 #include "server/bench/bench.h"
 #include "server/bench/bench_body.h"
 

@@ -9,8 +9,6 @@
 
 const float pal_chebyshev_weight[PAL_CHEBYSHEV_DEGREE] = {1.00842544782028f, 1.08867839208730f, 1.33753125909618f};
 
-/* products of the power iteration that finds a largest eigenvalue (tests/sim/implicit/test_preconditioner.c) */
-enum { POWER_ITERATIONS = 15 };
 /* rows of a piece of work of a thread: some five microseconds */
 enum { ROWS = 96 };
 /* relative shift of the coarsest diagonal: interpolation may lose rank at supports
@@ -151,11 +149,6 @@ void pal_multigrid_destroy(pal_multigrid *mg)
     free(mg);
 }
 
-size_t pal_multigrid_bytes(const pal_multigrid *mg)
-{
-    return pal_arena_used(mg->arena) + 4 * (size_t)pal_cholesky_nonzeros(mg->factor);
-}
-
 /* ---- values ---- */
 
 static int find(const matrix *a, int i, int32_t j)
@@ -201,49 +194,31 @@ void pal_multigrid_add_mass(pal_multigrid *mg, int finest_node, double mass)
         }
 }
 
-/* rows of finer nodes by the coarse nodes that they are interpolated from: list [first[n_coarse]], heap */
-static int32_t *transpose(const pal_grid_level *grid, int n_finer, int32_t **list)
-{
-    int32_t *first = calloc((size_t)grid->n_node + 2, sizeof *first);
-    *list = malloc(sizeof **list * ((size_t)grid->start[n_finer] + 1));
-    if (!first || !*list) {
-        free(first), free(*list);
-        return NULL;
-    }
-    for (int32_t k = 0; k < grid->start[n_finer]; k++) first[grid->from[k] + 2]++;
-    for (int i = 0; i < grid->n_node; i++) first[i + 2] += first[i + 1];
-    for (int i = 0; i < n_finer; i++)
-        for (int32_t k = grid->start[i]; k < grid->start[i + 1]; k++) (*list)[first[grid->from[k] + 1]++] = i;
-    return first;
-}
-
 static float weight(const pal_grid_level *grid, int32_t finer)
 {
     return 1 / (float)(grid->start[finer + 1] - grid->start[finer]);
 }
 
 /* coarse = P' finer P, row by row */
-static pal_err coarsen(pal_multigrid *mg, int level)
+static void coarsen(pal_multigrid *mg, int level)
 {
     const matrix *from = &mg->level[level - 1];
     const pal_grid_level *grid = &mg->grid->level[level];
     matrix *to = &mg->level[level];
-    int32_t *list, *first = transpose(grid, from->n, &list);
-    if (!first) return PAL_ERR_MEMORY;
     memset(to->value, 0, sizeof *to->value * (size_t)to->start[to->n]);
     for (int i = 0; i < to->n; i++) {
         for (int32_t k = to->start[i]; k < to->start[i + 1]; k++) mg->place[to->column[k]] = k;
-        for (int32_t f = first[i]; f < first[i + 1]; f++)
-            for (int32_t k = from->start[list[f]]; k < from->start[list[f] + 1]; k++) {
+        for (int32_t f = grid->begin[i]; f < grid->begin[i + 1]; f++) {
+            const int32_t finer = grid->finer[f];
+            for (int32_t k = from->start[finer]; k < from->start[finer + 1]; k++) {
                 const int32_t j = from->column[k];
-                const float w = grid->start[j] < grid->start[j + 1] ? weight(grid, list[f]) * weight(grid, j) : 0;
+                const float w = grid->start[j] < grid->start[j + 1] ? weight(grid, finer) * weight(grid, j) : 0;
                 for (int32_t m = grid->start[j]; m < grid->start[j + 1]; m++)
                     for (int c = 0; c < 3; c++) to->value[mg->place[grid->from[m]]][c] += w * from->value[k][c];
             }
+        }
         for (int32_t k = to->start[i]; k < to->start[i + 1]; k++) mg->place[to->column[k]] = -1;
     }
-    free(first), free(list);
-    return PAL_ERR_OK;
 }
 
 static pal_err factor_coarsest(pal_multigrid *mg)
@@ -275,25 +250,54 @@ static inline vec4 multiply_row(const matrix *a, int i, const vec4 *x)
     return sum + other;
 }
 
-/* one step of the smoother, or what else is done row by row */
+/* one step of the smoother, or what else is done row by row. Rows read x or d of their neighbours, so that x is not
+ * written while it is read: the step after FROM_X adds that direction, with its weight `late`, too */
 typedef struct pass {
     matrix *a;
-    enum { FROM_ZERO, FROM_X, STEP, RESIDUAL } what;
-    float keep, take, weight;
+    enum { FROM_ZERO, FROM_X, STEP, RESIDUAL, RESTRICT, PROLONG } what;
+    float keep, take, weight, late;
+    const pal_grid_level *grid; /* of the coarser of two levels, restrict and prolong */
+    const vec4 *other;          /* what the other level has */
 } pass;
+
+/* b = P' other of a coarse node; x += P other of a finer one */
+static void transfer_row(const pass *p, int i)
+{
+    const pal_grid_level *grid = p->grid;
+    const bool down = p->what == RESTRICT;
+    const int32_t *start = down ? grid->begin : grid->start, *list = down ? grid->finer : grid->from;
+    vec4 sum = {0};
+    for (int32_t k = start[i]; k < start[i + 1]; k++) sum += p->other[list[k]];
+    if (down)
+        p->a->b[i] = sum;
+    else if (start[i] < start[i + 1])
+        p->a->x[i] += sum / (float)(start[i + 1] - start[i]);
+}
+
+static void smooth_row(const pass *p, int i)
+{
+    matrix *a = p->a;
+    const vec4 b = p->what == STEP ? a->r[i] : a->b[i];
+    a->r[i] = p->what == FROM_ZERO ? b : b - multiply_row(a, i, p->what == STEP ? a->d : a->x);
+    if (p->what == RESIDUAL) return;
+    a->e[i] = p->take * a->inverse[i] * a->r[i];
+    if (p->what == STEP) a->e[i] += p->keep * a->d[i];
+    if (p->what == FROM_ZERO) a->x[i] = p->weight * a->e[i];
+    if (p->what == STEP) a->x[i] = p->weight * a->e[i] + (p->late > 0 ? p->late * a->d[i] + a->x[i] : a->x[i]);
+}
 
 static void pass_rows(void *user, int worker, int index)
 {
     const pass *p = user;
-    matrix *a = p->a;
-    const int first = index * ROWS, end = first + ROWS < a->n ? first + ROWS : a->n;
+    const int first = index * ROWS, end = first + ROWS < p->a->n ? first + ROWS : p->a->n;
     (void)worker;
     for (int i = first; i < end; i++) {
-        const vec4 b = p->what == STEP ? a->r[i] : a->b[i];
-        a->r[i] = p->what == FROM_ZERO ? b : b - multiply_row(a, i, p->what == STEP ? a->d : a->x);
-        if (p->what == RESIDUAL) continue;
-        a->e[i] = p->take * a->inverse[i] * a->r[i];
-        if (p->what == STEP) a->e[i] += p->keep * a->d[i];
+        if (p->what == RESTRICT || p->what == PROLONG)
+            transfer_row(p, i);
+        else
+            smooth_row(p, i);
+        /* what goes to a coarser level: the residual's parts, at nodes that take part */
+        if (p->what == RESIDUAL && p->grid->start[i] < p->grid->start[i + 1]) p->a->r[i] *= weight(p->grid, i);
     }
 }
 
@@ -301,11 +305,9 @@ static void run_pass(pass *p, pal_team *team)
 {
     matrix *a = p->a;
     pal_team_run(team, (a->n + ROWS - 1) / ROWS, pass_rows, p);
-    if (p->what == RESIDUAL) return;
+    if (p->what > STEP) return;
     vec4 *before = a->d;
     a->d = a->e, a->e = before;
-    /* a pass of its own, since rows read x of their neighbours */
-    for (int i = 0; i < a->n; i++) a->x[i] = p->weight * a->d[i] + (p->what == FROM_ZERO ? (vec4){0} : a->x[i]);
 }
 
 /* x = the smoother's answer, from 0 or from x */
@@ -321,7 +323,8 @@ static void smooth(matrix *a, pal_team *team, bool from_zero)
                          .what = STEP,
                          .keep = pal_chebyshev_keep(k),
                          .take = pal_chebyshev_take(k) / a->lambda,
-                         .weight = pal_chebyshev_weight[k]},
+                         .weight = pal_chebyshev_weight[k],
+                         .late = k == 1 && !from_zero ? pal_chebyshev_weight[0] : 0},
                  team);
 }
 
@@ -345,7 +348,7 @@ static void measure(matrix *a, const uint8_t *fixed)
         for (int c = 0; c < 3; c++) a->d[i][c] = a->inverse[i] > 0 ? (float)((7 * i + 3 * c) % 11 - 5) : 0;
     }
     double lambda = 1, size = size_of_direction(a);
-    for (int k = 0; k < POWER_ITERATIONS && size > 0 && isfinite(size); k++) {
+    for (int k = 0; k < PAL_POWER_ITERATIONS && size > 0 && isfinite(size); k++) {
         for (int i = 0; i < a->n; i++) a->d[i] *= (float)(1 / size);
         for (int i = 0; i < a->n; i++) a->r[i] = a->inverse[i] * multiply_row(a, i, a->d);
         for (int i = 0; i < a->n; i++) a->d[i] = a->r[i];
@@ -356,21 +359,12 @@ static void measure(matrix *a, const uint8_t *fixed)
 
 pal_err pal_multigrid_finish(pal_multigrid *mg)
 {
-    for (int k = 1; k < mg->n_level; k++) PAL_TRY(coarsen(mg, k));
+    for (int k = 1; k < mg->n_level; k++) coarsen(mg, k);
     for (int k = 0; k < mg->n_level - 1; k++) measure(&mg->level[k], mg->grid->level[k].fixed);
     return factor_coarsest(mg);
 }
 
 /* ---- cycle ---- */
-
-float *pal_multigrid_right_side(pal_multigrid *mg)
-{
-    return (float *)mg->level[0].b;
-}
-const float *pal_multigrid_answer(const pal_multigrid *mg)
-{
-    return (const float *)mg->level[0].x;
-}
 
 static void solve_coarsest(pal_multigrid *mg, matrix *a)
 {
@@ -391,26 +385,22 @@ static void cycle(pal_multigrid *mg, pal_team *team, int k)
     const pal_grid_level *grid = &mg->grid->level[k + 1];
     matrix *coarse = &mg->level[k + 1];
     smooth(a, team, true);
-    run_pass(&(pass){.a = a, .what = RESIDUAL}, team);
-    memset(coarse->b, 0, sizeof *coarse->b * (size_t)coarse->n);
-    for (int i = 0; i < a->n; i++) {
-        if (grid->start[i] == grid->start[i + 1]) continue;
-        const vec4 part = weight(grid, i) * a->r[i];
-        for (int32_t m = grid->start[i]; m < grid->start[i + 1]; m++) coarse->b[grid->from[m]] += part;
-    }
+    run_pass(&(pass){.a = a, .what = RESIDUAL, .grid = grid}, team);
+    run_pass(&(pass){.a = coarse, .what = RESTRICT, .grid = grid, .other = a->r}, team);
     cycle(mg, team, k + 1);
-    for (int i = 0; i < a->n; i++) {
-        if (grid->start[i] == grid->start[i + 1]) continue;
-        vec4 sum = {0};
-        for (int32_t m = grid->start[i]; m < grid->start[i + 1]; m++) sum += coarse->x[grid->from[m]];
-        a->x[i] += weight(grid, i) * sum;
-    }
+    run_pass(&(pass){.a = a, .what = PROLONG, .grid = grid, .other = coarse->x}, team);
     smooth(a, team, false);
 }
 
-void pal_multigrid_cycle(pal_multigrid *mg, pal_team *team)
+const float *pal_multigrid_cycle(pal_multigrid *mg, const float *residual, pal_team *team)
 {
+    run_pass(&(pass){.a = &mg->level[0],
+                     .what = RESTRICT,
+                     .grid = &mg->grid->level[0],
+                     .other = (const vec4 *)(const void *)residual},
+             team);
     cycle(mg, team, 0);
+    return (const float *)mg->level[0].x;
 }
 
 /* ---- cells ---- */

@@ -19,6 +19,8 @@
 enum { PAL_CHEBYSHEV_DEGREE = 3 };
 extern const float pal_chebyshev_weight[PAL_CHEBYSHEV_DEGREE];
 #define PAL_CHEBYSHEV_SAFE 1.1
+/* products of the power iteration that estimates it to a few per cent (tests/sim/implicit/test_preconditioner.c) */
+enum { PAL_POWER_ITERATIONS = 15 };
 /* d = keep d + take D^-1 r / lambda in step i of the iteration */
 static inline float pal_chebyshev_keep(int i)
 {
@@ -38,7 +40,9 @@ typedef struct pal_grid_level {
     int32_t *first;  /* first child of each cell                                               [n_cell + 1]     */
     uint8_t *octant; /* place of each finer cell in its cell, bits as of corners               [n_finer_cell]   */
     int32_t *start;  /* first entry in `from` of each finer node                               [n_finer_node + 1] */
-    int32_t *from;   /* nodes whose mean a finer node is; none: it is fixed */
+    int32_t *from;   /* nodes whose mean a finer node is; none: it is fixed                 [start[n_finer_node]] */
+    int32_t *begin;  /* first entry in `finer` of each node                                 [n_node + 1]     */
+    int32_t *finer;  /* the finer nodes that take part in a node, ascending                 [start[n_finer_node]] */
 } pal_grid_level;
 enum { PAL_GRID_LEVELS_MAX = 12 };
 typedef struct pal_grid_hierarchy {
@@ -51,20 +55,19 @@ typedef struct pal_multigrid pal_multigrid;
 /* makes patterns and vectors for a hierarchy of at least one level, which must outlive it. MEMORY. [load] */
 pal_err pal_multigrid_create(const pal_grid_hierarchy *grid, pal_multigrid **out);
 void pal_multigrid_destroy(pal_multigrid *mg); /* NULL is fine */
-size_t pal_multigrid_bytes(const pal_multigrid *mg);
 
 /* new values: zero, then add the first level's matrix cell by cell and the lumped masses of the finest nodes, then
- * finish makes the coarser levels. NUMERIC: the coarsest matrix is not positive definite; MEMORY */
+ * finish makes the coarser levels. NUMERIC: the coarsest matrix is not positive definite; MEMORY. No cycle may follow
+ * then */
 void pal_multigrid_zero(pal_multigrid *mg);
 void pal_multigrid_add_cell(pal_multigrid *mg, int cell, double k[24][24]);
 void pal_multigrid_add_mass(pal_multigrid *mg, int finest_node, double mass);
 pal_err pal_multigrid_finish(pal_multigrid *mg);
 
-/* vectors of the first level, x y z 0 of each node: a cycle reads the right side and writes the answer [n_node][4] */
-float *pal_multigrid_right_side(pal_multigrid *mg);
-const float *pal_multigrid_answer(const pal_multigrid *mg);
-/* answer ~ A^-1 right side. team: NULL, or threads that share the work; the same bits with any number */
-void pal_multigrid_cycle(pal_multigrid *mg, pal_team *team);
+/* answer ~ A^-1 P' residual on the first level; residual: of the finest nodes, each over the number of nodes that it is
+ * interpolated from, x y z 0 [n_finest][4]; answer: x y z 0 of the first level's nodes [n_node][4], until the next
+ * cycle. team: NULL, or threads that share the work; the same bits with any number */
+const float *pal_multigrid_cycle(pal_multigrid *mg, const float *residual, pal_team *team);
 
 /* k [24][24], a matrix of a finer cell in corners and axes, interpolated from the corners of the cell that contains it
  * at `octant` and added to `to`; corners whose bits are set in `fixed` do not move */

@@ -36,30 +36,42 @@ typedef struct work {
     int n_coarse;
 } work;
 
-static bool share_node(const work *w, int32_t a, int32_t b)
+/* numbers the groups of the cells first to end of one block, from the smallest cell of each; cells that share a node
+ * are of one group. seen [n_node]: a cell at each node, of this block or an earlier one; join [n_cell]: by place in
+ * `entry` */
+static void group_block(work *w, const entry *first, const entry *end, int32_t *seen, int32_t *join)
 {
-    for (int c = 0; c < 8; c++)
-        for (int d = 0; d < 8; d++)
-            if (w->from.node[8 * (size_t)a + (size_t)c] == w->from.node[8 * (size_t)b + (size_t)d]) return true;
-    return false;
+    const int32_t begin = (int32_t)(first - w->entry), n = (int32_t)(end - first);
+    pal_union_find_init(join, n);
+    for (int32_t k = 0; k < n; k++)
+        for (int c = 0; c < 8; c++) {
+            int32_t *at = &seen[w->from.node[8 * (size_t)first[k].cell + (size_t)c]];
+            if (*at >= begin)
+                pal_union_find_join(join, *at - begin, k);
+            else
+                *at = begin + k;
+        }
+    const int32_t n_group = pal_union_find_label(join, n);
+    for (int32_t k = 0; k < n; k++) w->group[first[k].cell] = w->n_coarse + join[k];
+    w->n_coarse += n_group;
 }
 
-/* numbers the groups of the cells first to end of one block, from the smallest cell of each */
-static void group_block(work *w, const entry *first, const entry *end)
+/* groups of all blocks, whose entries are sorted */
+static pal_err group_cells(work *w)
 {
-    for (const entry *e = first; e < end; e++) w->group[e->cell] = -1;
-    for (const entry *e = first; e < end; e++) {
-        if (w->group[e->cell] >= 0) continue;
-        w->group[e->cell] = w->n_coarse;
-        for (bool grown = true; grown;) {
-            grown = false;
-            for (const entry *a = first; a < end; a++)
-                for (const entry *b = first; b < end && w->group[a->cell] < 0; b++)
-                    if (w->group[b->cell] == w->n_coarse && share_node(w, a->cell, b->cell))
-                        w->group[a->cell] = w->n_coarse, grown = true;
+    pal_err err = PAL_ERR_OK;
+    int32_t *seen, *join;
+    PAL_ARRAY(&err, seen, (size_t)w->from.n_node + 1);
+    PAL_ARRAY(&err, join, (size_t)w->from.n_cell + 1);
+    for (int i = 0; i < w->from.n_node && !err; i++) seen[i] = -1;
+    const entry *end = w->entry + w->from.n_cell;
+    for (const entry *e = w->entry, *next; e < end && !err; e = next) {
+        for (next = e + 1; next < end && same_block(e, next); next++) {
         }
-        w->n_coarse++;
+        group_block(w, e, next, seen, join);
     }
+    free(seen), free(join);
+    return err;
 }
 
 /* Corner `corner` of the cell at `octant` of a coarse cell lies between corners of it: calls of visit(k) with the index
@@ -107,6 +119,20 @@ static pal_err list_children(const work *w, pal_arena *arena, pal_grid_level *ou
     return PAL_ERR_OK;
 }
 
+/* the finer nodes that take part in each node */
+static pal_err list_finer(int n_finer, pal_arena *arena, pal_grid_level *out)
+{
+    const int32_t n_entry = out->start[n_finer];
+    out->begin = PAL_NEW(arena, int32_t, out->n_node + 2);
+    out->finer = PAL_NEW(arena, int32_t, n_entry);
+    if (!out->begin || !out->finer) return PAL_ERR_MEMORY;
+    for (int32_t k = 0; k < n_entry; k++) out->begin[out->from[k] + 2]++;
+    for (int i = 0; i < out->n_node; i++) out->begin[i + 2] += out->begin[i + 1];
+    for (int i = 0; i < n_finer; i++)
+        for (int32_t k = out->start[i]; k < out->start[i + 1]; k++) out->finer[out->begin[out->from[k] + 1]++] = i;
+    return PAL_ERR_OK;
+}
+
 /* interpolation, corners of cells, nodes that no free node uses */
 static pal_err fill_nodes(work *w, pal_arena *arena, pal_grid_level *out)
 {
@@ -132,7 +158,7 @@ static pal_err fill_nodes(work *w, pal_arena *arena, pal_grid_level *out)
             out->from[n_from] = w->root[w->corner[8 * i + k]];
             out->fixed[out->from[n_from++]] = 0;
         }
-    return PAL_ERR_OK;
+    return list_finer(n, arena, out);
 }
 
 /* place [n_coarse][3], heap, of the coarse cells */
@@ -152,12 +178,7 @@ static pal_err coarsen(work *w, pal_arena *arena, pal_grid_level *out, int32_t *
         out->octant[e] = (uint8_t)((at[0] & 1) + 2 * (at[1] & 1) + 4 * (at[2] & 1));
     }
     qsort(w->entry, (size_t)from->n_cell, sizeof *w->entry, compare_entries);
-    const entry *end = w->entry + from->n_cell;
-    for (const entry *e = w->entry, *next; e < end; e = next) {
-        for (next = e + 1; next < end && same_block(e, next); next++) {
-        }
-        group_block(w, e, next);
-    }
+    PAL_TRY(group_cells(w));
     PAL_ARRAY(&err, *place, 3 * (size_t)w->n_coarse + 1);
     PAL_ARRAY(&err, w->root, 8 * (size_t)w->n_coarse + 1);
     if (err) return err;
@@ -182,7 +203,7 @@ pal_err pal_cell_hierarchy_make(const pal_lattice_cells *cells, int n_coarsest, 
         err = coarsen(&w, arena, level, &coarse);
         free(w.entry), free(w.group), free(w.corner), free(w.root), free(place);
         place = coarse;
-        if (err || level->n_node >= w.from.n_node) break;
+        if (err || level->n_node > PAL_LEVEL_SHRINKS * w.from.n_node) break;
         w = (work){.from = {level->n_cell, level->n_node, level->node, place, level->fixed}};
         out->n_level++;
     }

@@ -18,7 +18,12 @@ typedef struct pal_lattice_cells {
     const uint8_t *fixed; /* nodes that do not move                             [n_node]    */
 } pal_lattice_cells;
 
-/* Levels until one has at most n_coarsest nodes, or is no coarser than the one before; MEMORY */
+/* of a finer level's nodes: a level with more of them costs nearly as much as that one and corrects little
+ * (tests/mesh/volume/test_cell_hierarchy.c) */
+#define PAL_LEVEL_SHRINKS 0.8
+/* Levels until one has at most n_coarsest nodes, or the next would have more than PAL_LEVEL_SHRINKS of its nodes;
+ * MEMORY
+ */
 pal_err pal_cell_hierarchy_make(const pal_lattice_cells *cells, int n_coarsest, pal_arena *arena,
                                 pal_grid_hierarchy *out);
 #endif

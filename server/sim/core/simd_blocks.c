@@ -223,23 +223,24 @@ void pal_node_order_add(pal_node_order *node_order, double *force)
     run_nodes(&(node_pass){.order = node_order, .force = force});
 }
 
-/* plane of a node across the shortest axis */
-static int plane_of(const lattice *l, const double *x_rest, int node, double edge_m)
+/* plane across the shortest axis that a slot belongs to, with a node or without; beyond the last one where there is no
+ * such slot of the lattice */
+static int plane_of(const lattice *l, int slot)
 {
-    const int axis = l->axis[2];
-    return (int)floor((x_rest[3 * (size_t)node + (size_t)axis] - l->low[axis]) / edge_m + 0.5);
+    const int class = slot / l->n_class, index = slot % l->n_class;
+    return 2 * (index / (l->half[0] * l->half[1])) + (class >> 2 & 1) + (class > 7 ? l->n[l->axis[2]] : 0);
 }
 
-/* A kernel adds zeros at the slots of a block's lanes without an element: does any of the block's slots have a node
- * elsewhere than on the planes of its layer? plane: of each slot, -1: of none */
+/* A kernel adds zeros at the slots of a block's lanes without an element: is any of the block's slots elsewhere than on
+ * the planes of its layer? plane: of each slot */
 static bool strays(const pal_simd_blocks *blocks, int b, int layer, const int32_t *plane)
 {
-    const int32_t *base = blocks->base + blocks->n_corner * b;
     if (b >= blocks->n_strip) return true;
+    const int32_t *base = blocks->base + blocks->n_corner * b;
     for (int c = 0; c < blocks->n_corner; c++)
         for (int l = 0; l < PAL_LANES; l++) {
             const int32_t at = plane[base[c] + l];
-            if (at >= 0 && at != layer && at != layer + 1) return true;
+            if (at != layer && at != layer + 1) return true;
         }
     return false;
 }
@@ -254,8 +255,7 @@ static int find_layers(const pal_simd_blocks *blocks, const pal_node_order *orde
     if (!find_lattice(x_rest, order->n_node, edge_m, &l)) return 0;
     int32_t *plane = malloc(sizeof *plane * (size_t)order->n_slot);
     if (!plane) return -1;
-    for (int i = 0; i < order->n_slot; i++) plane[i] = -1;
-    for (int i = 0; i < order->n_node; i++) plane[order->slot[i]] = plane_of(&l, x_rest, i, edge_m);
+    for (int i = 0; i < order->n_slot; i++) plane[i] = plane_of(&l, i);
     for (int i = 0; i < n_item; i++) { /* the first element of a block decides, the others agree or stray */
         int lowest = INT_MAX;
         for (int c = 0; c < blocks->n_corner; c++) {

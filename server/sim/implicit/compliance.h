@@ -1,12 +1,12 @@
 /* Static compliance of a body at its present shape: the displacement caused by a load, by conjugate gradients on the
  * true stiffness. The product of the stiffness with a direction is a central difference of the components' forces.
  * (The solvers' tangents omit the terms that make them indefinite; on a beam bent by half its length these are a
- * quarter to a half of the displacement.) The preconditioner is the factor of the stiffness at rest, warped by the
- * present rotations (warp.h).
- * A call starts from the displacement under a similar load and makes at most three iterations, each one solve with the
- * factor and two evaluations of forces. Near rest this is accurate; on a strongly bent body it converges within a few
- * calls, which a contact of several steps makes anyway. Built only where a CONTACT component asks for it. Thread:
- * [load] to make, then [sim]. */
+ * quarter to a half of the displacement.) The preconditioner is of the stiffness at rest and of the solver's kind,
+ * warped by the present rotations (warp.h). A call starts from the displacement under a similar load and makes at most
+ * three iterations, each one solve with the preconditioner and two evaluations of forces; it ends once the energy,
+ * which is the compliance, is known well enough (PAL_COMPLIANCE_GAIN). Near rest this is accurate; on a strongly bent
+ * body it converges within a few calls, which a contact of several steps makes anyway. Built only where a CONTACT
+ * component asks for it. Thread: [load] to make, then [sim]. */
 #ifndef PAL_SIM_IMPLICIT_COMPLIANCE_H
 #define PAL_SIM_IMPLICIT_COMPLIANCE_H
 #include "server/num/conjugate_gradient.h"

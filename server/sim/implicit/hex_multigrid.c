@@ -80,24 +80,27 @@ pal_err pal_hex_multigrid_make(pal_hex_levels *levels, pal_arena *arena, pal_hex
 {
     const size_t n = (size_t)levels->n_slot, n_lane = PAL_LANES * (size_t)levels->cubes->n_block;
     *out = (pal_hex_multigrid){.levels = levels};
-    out->weight = PAL_NEW(arena, float, n), out->inverse = PAL_NEW(arena, float, n);
-    if (!out->weight || !out->inverse) return PAL_ERR_MEMORY;
+    for (int k = 0; k < 2; k++) {
+        pal_hex_values *values = k == 0 ? &out->now : &out->next;
+        values->weight = PAL_NEW(arena, float, n), values->inverse = PAL_NEW(arena, float, n);
+        if (!values->weight || !values->inverse) return PAL_ERR_MEMORY;
+    }
     if (levels->single.rotation) {
         out->turned = PAL_NEW(arena, float, 9 * n_lane);
         if (!out->turned) return PAL_ERR_MEMORY;
     }
-    PAL_TRY(pal_multigrid_create(&levels->grid, &out->coarse));
+    PAL_TRY(pal_multigrid_create(&levels->grid, &out->now.coarse));
     pal_spare_thread_init(&out->spare_thread);
     return PAL_ERR_OK;
 }
 
 void pal_hex_multigrid_destroy(pal_hex_multigrid *mg)
 {
-    if (!mg->coarse) return;
+    if (!mg->now.coarse) return;
     pal_spare_thread_destroy(&mg->spare_thread);
-    pal_multigrid_destroy(mg->coarse);
-    pal_multigrid_destroy(mg->next);
-    mg->coarse = mg->next = NULL;
+    pal_multigrid_destroy(mg->now.coarse);
+    pal_multigrid_destroy(mg->next.coarse);
+    mg->now.coarse = mg->next.coarse = NULL;
 }
 
 /* ---- finest level ---- */
@@ -105,7 +108,7 @@ void pal_hex_multigrid_destroy(pal_hex_multigrid *mg)
 /* q = A p, where q is weight p already */
 static void multiply(const pal_hex_multigrid *mg, const float *p)
 {
-    pal_hex_single_multiply(&mg->levels->single, mg->levels->body->team, mg->stiff, p, mg->levels->q);
+    pal_hex_single_multiply(&mg->levels->single, mg->levels->body->team, (float)mg->now.stiff, p, mg->levels->q);
 }
 
 /* one step of the smoother on a piece of the groups of slots: r, d, x, and q = weight times what is multiplied next */
@@ -125,7 +128,7 @@ static void pass_groups(void *user, int worker, int index)
     (void)worker;
     for (int g = first; g < end; g++) {
         const size_t at = (size_t)mg->levels->group[g];
-        const vec8 take = p->take * load(mg->inverse + at), weight = load(mg->weight + at);
+        const vec8 take = p->take * load(mg->now.inverse + at), weight = load(mg->now.weight + at);
         for (size_t i = at; i < 3 * n; i += n) {
             vec8 r = load((p->what == STEP ? mg->levels->r : mg->levels->b) + i), x = {0};
             if (p->what != FROM_ZERO) r -= load(mg->levels->q + i), x = load(mg->levels->x + i);
@@ -150,7 +153,7 @@ static void smooth(const pal_hex_multigrid *mg, bool from_zero)
     if (!from_zero) multiply(mg, mg->levels->x);
     run_pass(&(pass){.mg = mg,
                      .what = from_zero ? FROM_ZERO : FROM_X,
-                     .take = 4 / (3 * mg->lambda),
+                     .take = 4 / (3 * mg->now.lambda),
                      .weight = pal_chebyshev_weight[0]});
     for (int k = 1; k < PAL_CHEBYSHEV_DEGREE; k++) {
         multiply(mg, mg->levels->d);
@@ -158,7 +161,7 @@ static void smooth(const pal_hex_multigrid *mg, bool from_zero)
                          .what = STEP,
                          .last = k == PAL_CHEBYSHEV_DEGREE - 1,
                          .keep = pal_chebyshev_keep(k),
-                         .take = pal_chebyshev_take(k) / mg->lambda,
+                         .take = pal_chebyshev_take(k) / mg->now.lambda,
                          .weight = pal_chebyshev_weight[k]});
     }
 }
@@ -178,6 +181,7 @@ typedef struct transfer {
     const pal_warp *warp;
     const double *in;
     double *out, scale;
+    const float *coarse; /* answer of the first coarser level */
     enum { TAKE, RESTRICT, PROLONG, GIVE } what;
 } transfer;
 
@@ -201,7 +205,7 @@ static void prolong_node(const transfer *t, int i, size_t at)
     const pal_hex_multigrid *mg = t->mg;
     const pal_grid_level *grid = &mg->levels->grid.level[0];
     const size_t n = (size_t)mg->levels->n_slot;
-    const float *x = pal_multigrid_answer(mg->coarse);
+    const float *x = t->coarse;
     float v[3] = {0, 0, 0}, turned[3];
     for (int k = grid->start[i]; k < grid->start[i + 1]; k++)
         for (int c = 0; c < 3; c++) v[c] += x[4 * grid->from[k] + c];
@@ -211,7 +215,7 @@ static void prolong_node(const transfer *t, int i, size_t at)
         memcpy(turned, v, sizeof v);
     for (size_t c = 0; c < 3; c++) {
         mg->levels->x[at + c * n] += turned[c] / (float)(grid->start[i + 1] - grid->start[i]);
-        mg->levels->q[at + c * n] = mg->weight[at] * mg->levels->x[at + c * n];
+        mg->levels->q[at + c * n] = mg->now.weight[at] * mg->levels->x[at + c * n];
     }
 }
 
@@ -245,16 +249,10 @@ static void run_transfer(transfer *t)
 /* the coarse levels' part: x += W P A1^-1 P' W' (b - A x) */
 static void correct(pal_hex_multigrid *mg, const pal_warp *warp)
 {
-    const pal_grid_level *grid = &mg->levels->grid.level[0];
-    float *b = pal_multigrid_right_side(mg->coarse);
     transfer t = {.mg = mg, .warp = warp, .what = RESTRICT};
     multiply(mg, mg->levels->x);
     run_transfer(&t);
-    memset(b, 0, 4 * sizeof *b * (size_t)grid->n_node);
-    for (int i = 0; i < mg->levels->body->n_node; i++)
-        for (int k = grid->start[i]; k < grid->start[i + 1]; k++)
-            for (int c = 0; c < 4; c++) b[4 * grid->from[k] + c] += mg->levels->part[4 * i + c];
-    pal_multigrid_cycle(mg->coarse, mg->levels->body->team);
+    t.coarse = pal_multigrid_cycle(mg->now.coarse, mg->levels->part, mg->levels->body->team);
     t.what = PROLONG;
     run_transfer(&t);
 }
@@ -279,42 +277,43 @@ void pal_hex_multigrid_solve(pal_hex_multigrid *mg, const pal_warp *warp, const 
 /* ---- values ---- */
 
 /* values of the coarser levels, of the rotations given */
-static pal_err fill_levels(const pal_hex_multigrid *mg, const float *rotation, pal_multigrid *to)
+static pal_err fill_levels(const pal_hex_levels *levels, const float *rotation, const pal_hex_values *to)
 {
-    const pal_grid_level *grid = &mg->levels->grid.level[0];
-    const pal_body *body = mg->levels->body;
-    pal_multigrid_zero(to);
+    const pal_grid_level *grid = &levels->grid.level[0];
+    const pal_body *body = levels->body;
+    pal_multigrid_zero(to->coarse);
     for (int g = 0; g < grid->n_cell; g++) {
         double sum[24][24] = {{0}}, k[24][24];
         for (int32_t m = grid->first[g]; m < grid->first[g + 1]; m++) {
             const int e = grid->child[m];
             unsigned fixed = 0;
             for (int c = 0; c < 8; c++) fixed |= body->support[body->hexes->node[8 * e + c]] ? 1u << c : 0;
-            pal_hex_single_element(&mg->levels->single, rotation, e, (double)mg->stiff, k);
+            pal_hex_single_element(&levels->single, rotation, e, to->stiff, k);
             pal_multigrid_coarsen_cell(k, grid->octant[e], fixed, sum);
         }
-        pal_multigrid_add_cell(to, g, sum);
+        pal_multigrid_add_cell(to->coarse, g, sum);
     }
-    for (int i = 0; i < body->n_node; i++) pal_multigrid_add_mass(to, i, (double)mg->weight[body->node_order->slot[i]]);
-    return pal_multigrid_finish(to);
+    for (int i = 0; i < body->n_node; i++)
+        pal_multigrid_add_mass(to->coarse, i, (double)to->weight[body->node_order->slot[i]]);
+    return pal_multigrid_finish(to->coarse);
 }
 
 /* masses and D of the finest level */
-static void fill_diagonal(pal_hex_multigrid *mg, double mass)
+static void fill_diagonal(const pal_hex_levels *levels, pal_hex_values *to)
 {
-    const pal_body *body = mg->levels->body;
+    const pal_body *body = levels->body;
     const pal_hexes *hexes = body->hexes;
     const int32_t *slot = body->node_order->slot;
     double k[24][24];
-    memset(mg->inverse, 0, sizeof *mg->inverse * (size_t)mg->levels->n_slot);
+    memset(to->inverse, 0, sizeof *to->inverse * (size_t)levels->n_slot);
     for (int e = 0; e < hexes->n_hex; e++) {
-        pal_hex_single_element(&mg->levels->single, NULL, e, (double)mg->stiff, k);
+        pal_hex_single_element(&levels->single, NULL, e, to->stiff, k);
         for (int c = 0; c < 24; c += 3)
-            mg->inverse[slot[hexes->node[8 * e + c / 3]]] += (float)((k[c][c] + k[c + 1][c + 1] + k[c + 2][c + 2]) / 3);
+            to->inverse[slot[hexes->node[8 * e + c / 3]]] += (float)((k[c][c] + k[c + 1][c + 1] + k[c + 2][c + 2]) / 3);
     }
     for (int i = 0; i < body->n_node; i++) {
-        float *inverse = &mg->inverse[slot[i]], weight = (float)(mass * body->mass_kg[i]);
-        mg->weight[slot[i]] = weight;
+        float *inverse = &to->inverse[slot[i]], weight = (float)(to->mass * body->mass_kg[i]);
+        to->weight[slot[i]] = weight;
         *inverse = !body->support[i] && *inverse + weight > 0 ? 1 / (*inverse + weight) : 0;
     }
 }
@@ -327,34 +326,34 @@ static double size_of(const pal_hex_multigrid *mg, const float *d)
     for (int i = 0; i < mg->levels->body->n_node; i++)
         for (int c = 0; c < 3; c++) {
             const size_t at = (size_t)slot[i] + (size_t)c * (size_t)mg->levels->n_slot;
-            if (mg->inverse[slot[i]] > 0) sum += (double)(d[at] * d[at] / mg->inverse[slot[i]]);
+            const float inverse = mg->now.inverse[slot[i]];
+            if (inverse > 0) sum += (double)(d[at] * d[at] / inverse);
         }
     return sqrt(sum);
 }
 
-/* largest eigenvalue of D^-1 A by power iteration */
+/* largest eigenvalue of D^-1 A by power iteration from a vector that is not smooth */
 static void find_lambda(pal_hex_multigrid *mg)
 {
     const int32_t *slot = mg->levels->body->node_order->slot;
     const size_t n = (size_t)mg->levels->n_slot;
+    float *d = mg->levels->d, *q = mg->levels->q;
+    memset(d, 0, 3 * sizeof *d * n);
     for (int i = 0; i < mg->levels->body->n_node; i++)
-        for (size_t c = 0; c < 3; c++) {
-            const size_t at = (size_t)slot[i] + c * n;
-            mg->levels->d[at] = mg->inverse[slot[i]] > 0 ? (float)((7 * i + 3 * (int)c) % 11 - 5) : 0;
-        }
-    double lambda = 1, size = size_of(mg, mg->levels->d);
+        for (size_t c = 0; c < 3 && mg->now.inverse[slot[i]] > 0; c++)
+            d[(size_t)slot[i] + c * n] = (float)((7 * i + 3 * (int)c) % 11 - 5);
+    double lambda = 1, size = size_of(mg, d);
     for (int k = 0; k < PAL_POWER_ITERATIONS && size > 0 && isfinite(size); k++) {
         for (int g = 0; g < mg->levels->n_group; g++)
-            for (size_t i = (size_t)mg->levels->group[g]; i < 3 * n; i += n)
-                store(mg->levels->q + i, load(mg->weight + mg->levels->group[g]) * load(mg->levels->d + i));
-        multiply(mg, mg->levels->d);
+            for (size_t at = (size_t)mg->levels->group[g], i = at; i < 3 * n; i += n)
+                store(q + i, load(mg->now.weight + at) * load(d + i));
+        multiply(mg, d);
         for (int g = 0; g < mg->levels->n_group; g++)
-            for (size_t i = (size_t)mg->levels->group[g]; i < 3 * n; i += n)
-                store(mg->levels->d + i,
-                      load(mg->levels->q + i) * load(mg->inverse + mg->levels->group[g]) * (float)(1 / size));
-        lambda = size = size_of(mg, mg->levels->d);
+            for (size_t at = (size_t)mg->levels->group[g], i = at; i < 3 * n; i += n)
+                store(d + i, load(q + i) * load(mg->now.inverse + at) * (float)(1 / size));
+        lambda = size = size_of(mg, d);
     }
-    mg->lambda = (float)(PAL_CHEBYSHEV_SAFE * lambda);
+    mg->now.lambda = (float)(PAL_CHEBYSHEV_SAFE * lambda);
 }
 
 void pal_hex_multigrid_rotate(pal_hex_multigrid *mg)
@@ -365,24 +364,28 @@ void pal_hex_multigrid_rotate(pal_hex_multigrid *mg)
 pal_err pal_hex_multigrid_update(pal_hex_multigrid *mg, double mass, double stiff)
 {
     pal_spare_thread_wait(&mg->spare_thread);
-    mg->stiff = (float)stiff;
+    mg->now.mass = mass, mg->now.stiff = stiff;
     pal_hex_single_stiffen(&mg->levels->single);
     pal_hex_single_rotate(&mg->levels->single);
-    fill_diagonal(mg, mass);
+    fill_diagonal(mg->levels, &mg->now);
     find_lambda(mg);
-    return fill_levels(mg, mg->levels->single.rotation, mg->coarse);
+    return fill_levels(mg->levels, mg->levels->single.rotation, &mg->now);
 }
 
 static void make_next(void *self)
 {
     pal_hex_multigrid *mg = self;
-    mg->outcome = mg->next ? PAL_ERR_OK : pal_multigrid_create(&mg->levels->grid, &mg->next);
-    if (!mg->outcome) mg->outcome = fill_levels(mg, mg->turned, mg->next);
+    pal_hex_values *next = &mg->next;
+    mg->outcome = next->coarse ? PAL_ERR_OK : pal_multigrid_create(&mg->levels->grid, &next->coarse);
+    if (mg->outcome) return;
+    fill_diagonal(mg->levels, next);
+    mg->outcome = fill_levels(mg->levels, mg->turned, next);
 }
 
-pal_err pal_hex_multigrid_refresh(pal_hex_multigrid *mg)
+pal_err pal_hex_multigrid_refresh(pal_hex_multigrid *mg, double mass, double stiff)
 {
     const pal_elastic_hexes *cubes = mg->levels->cubes;
+    mg->next.mass = mass, mg->next.stiff = stiff;
     for (int i = 0; i < 9 * PAL_LANES * cubes->n_block && mg->turned; i++) mg->turned[i] = (float)cubes->rotation[i];
     return pal_spare_thread_run(&mg->spare_thread, make_next, mg);
 }
@@ -391,8 +394,11 @@ pal_err pal_hex_multigrid_adopt(pal_hex_multigrid *mg)
 {
     pal_spare_thread_wait(&mg->spare_thread);
     if (mg->outcome) return mg->outcome;
-    pal_multigrid *before = mg->coarse;
-    mg->coarse = mg->next, mg->next = before;
+    const pal_hex_values before = mg->now;
+    mg->now = mg->next, mg->next = before;
+    mg->now.lambda = before.lambda;
+    /* rotations do not change it */
+    if (mg->now.mass != before.mass || mg->now.stiff != before.stiff) find_lambda(mg);
     return PAL_ERR_OK;
 }
 

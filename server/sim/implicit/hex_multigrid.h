@@ -1,9 +1,11 @@
 /* Multigrid preconditioner of a body of voxel hexahedra (linear or corotational law): A = mass M + stiff K without
  * contact. The finest level has no matrix: it multiplies in single precision with the present rotations, and smooths in
  * place (num/multigrid.h has the smoother and the coarser levels). The coarser levels are those of the state at the
- * last pal_hex_multigrid_update, warped to the present one (warp.h): z = W P A1^-1 P' W' r. Four to eight iterations of
- * conjugate gradients to 1e-2 at any number of nodes (tests/sim/implicit/test_preconditioner.c). Memory: the caller's
- * arena, and the heap for the coarser levels. Thread: [load] to make, then [sim]. */
+ * last update or refresh, warped to the present one (warp.h): z = W P A1^-1 P' W' r. The number of iterations of
+ * conjugate gradients does not grow with the number of nodes: 10 or 11 to 1e-6
+ * (tests/sim/implicit/test_preconditioner.c). Memory: the caller's arena, and the heap for the coarser levels, in make
+ * and in the first refresh, whose factor of the coarsest level uses it in every update. Thread: [load] to make, then
+ * [sim]. */
 #ifndef PAL_SIM_IMPLICIT_HEX_MULTIGRID_H
 #define PAL_SIM_IMPLICIT_HEX_MULTIGRID_H
 #include "server/base/spare_thread.h"
@@ -23,14 +25,20 @@ typedef struct pal_hex_levels {
     float *part;              /* of residuals at nodes, x y z 0 [n_node][4] */
 } pal_hex_levels;
 
+/* what the levels hold of one A */
+typedef struct pal_hex_values {
+    double mass, stiff;      /* factors of M and K in A */
+    float lambda;            /* no eigenvalue of D^-1 A is larger */
+    float *weight, *inverse; /* mass M; 1 / D, 0 at fixed nodes and empty slots [n_slot] */
+    pal_multigrid *coarse;   /* of the next values: NULL before the first refresh */
+} pal_hex_values;
+
 typedef struct pal_hex_multigrid {
     pal_hex_levels *levels;
-    pal_multigrid *coarse, *next; /* in use; in the making on the spare thread, NULL before the first refresh */
+    pal_hex_values now, next; /* in use; in the making on the spare thread */
     pal_spare_thread spare_thread;
-    pal_err outcome;         /* of the spare thread */
-    float *turned;           /* rotations at the refresh, as in `single`; NULL: the law is linear */
-    float lambda, stiff;     /* no eigenvalue of D^-1 A is larger; factor of K in A */
-    float *weight, *inverse; /* mass M; 1 / D, 0 at fixed nodes and empty slots [n_slot] */
+    pal_err outcome; /* of the spare thread */
+    float *turned;   /* rotations at the refresh, as in `single`; NULL: the law is linear */
 } pal_hex_multigrid;
 
 /* MEMORY. [load] */
@@ -38,10 +46,11 @@ pal_err pal_hex_levels_make(const pal_body *body, const pal_elastic_hexes *cubes
                             pal_hex_levels *out);
 pal_err pal_hex_multigrid_make(pal_hex_levels *levels, pal_arena *arena, pal_hex_multigrid *out);
 void pal_hex_multigrid_destroy(pal_hex_multigrid *mg);
-/* takes material and rotations of the last linearise. NUMERIC: not positive definite; MEMORY */
+/* takes material and rotations of the last linearise. NUMERIC: not positive definite; MEMORY; no solve may follow then
+ */
 pal_err pal_hex_multigrid_update(pal_hex_multigrid *mg, double mass, double stiff);
-/* starts coarser levels of the rotations of the last linearise on a spare thread. MEMORY */
-pal_err pal_hex_multigrid_refresh(pal_hex_multigrid *mg);
+/* starts levels of the rotations of the last linearise on a spare thread. MEMORY */
+pal_err pal_hex_multigrid_refresh(pal_hex_multigrid *mg, double mass, double stiff);
 /* waits for them and puts them into use. NUMERIC, MEMORY: the ones before stay */
 pal_err pal_hex_multigrid_adopt(pal_hex_multigrid *mg);
 double pal_hex_multigrid_flops(const pal_hex_multigrid *mg); /* operations of a refresh, equal on all machines */

@@ -93,12 +93,15 @@ static pal_err choose(pal_preconditioner *p, const pal_elastic_hexes *cubes, pal
                  1e-6 * entries, stiff);
         if (entries < PAL_FACTOR_ENTRIES || stiff > PAL_MULTIGRID_CONTRAST) return PAL_ERR_OK;
         pal_cholesky_destroy(p->factor);
-        p->factor = NULL;
+        p->factor = NULL, p->analyse_s = 0;
     } else {
         snprintf(p->reason, sizeof p->reason, "its %d nodes are too many for a factor", body->n_node);
     }
     PAL_TRY(make_levels(p, cubes, arena));
-    if (p->levels->grid.n_level > 0) p->kind = PAL_PRECONDITION_MULTIGRID;
+    if (p->levels->grid.n_level > 0)
+        p->kind = PAL_PRECONDITION_MULTIGRID;
+    else
+        snprintf(p->reason, sizeof p->reason, "its %d nodes hang together too little for coarser levels", body->n_node);
     return PAL_ERR_OK;
 }
 
@@ -171,7 +174,7 @@ static pal_err invert_diagonal(pal_preconditioner *p)
     return PAL_ERR_OK;
 }
 
-static pal_err update(pal_preconditioner *p)
+static pal_err update(pal_preconditioner *p, bool pending)
 {
     const pal_system *system = p->system;
     if (p->kind == PAL_PRECONDITION_MULTIGRID)
@@ -179,15 +182,17 @@ static pal_err update(pal_preconditioner *p)
     pal_system_assemble(p->system, &p->blocks);
     if (p->kind == PAL_PRECONDITION_JACOBI) return invert_diagonal(p);
     if (p->kind == PAL_PRECONDITION_INCOMPLETE) return pal_incomplete_cholesky_factor(&p->incomplete, &p->blocks);
-    (void)pal_cholesky_adopt(p->factor);
+    /* the factor in the making is the one in use if this one fails */
+    if (pending && !pal_cholesky_adopt(p->factor))
+        memcpy(p->warp.base, p->next, 4 * sizeof(double) * (size_t)p->warp.n_dof);
     return pal_cholesky_factor(p->factor, &p->blocks, p->single);
 }
 
 pal_err pal_preconditioner_update(pal_preconditioner *p)
 {
     const double before = pal_clock_s() - p->system->assemble_s;
+    pal_err err = update(p, p->pending);
     p->pending = false, p->left_s = 0;
-    pal_err err = update(p);
     p->update_s += pal_clock_s() - p->system->assemble_s - before;
     if (err) return err;
     p->n_update++;
@@ -213,7 +218,8 @@ bool pal_preconditioner_refresh(pal_preconditioner *p, bool at_rest)
     if (!pal_preconditioner_ready(p)) return false;
     double flops;
     if (p->kind == PAL_PRECONDITION_MULTIGRID) {
-        if (pal_hex_multigrid_refresh(&p->multigrid)) return false;
+        if (pal_hex_multigrid_refresh(&p->multigrid, p->system->mass, p->system->stiff + p->system->viscous))
+            return false;
         flops = pal_hex_multigrid_flops(&p->multigrid);
     } else if (p->kind == PAL_PRECONDITION_FACTOR) {
         pal_system_assemble(p->system, &p->blocks);

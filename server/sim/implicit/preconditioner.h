@@ -1,15 +1,15 @@
 /* Preconditioners of implicit systems, A = (system->mass) M + (system->stiff) K without contact, chosen at load:
  *   jacobi:     the inverses of the diagonal's blocks at the last update; nothing to make,
  *   factor:     a Cholesky factor, warped (warp.h); best for small bodies.
- *   multigrid:  hex_multigrid.h; bodies of voxel hexahedra, any number of nodes; of both a newer one is made on a spare
- *               thread when solves need too many iterations,
+ *   multigrid:  hex_multigrid.h; bodies of voxel hexahedra, any number of nodes;
  *   incomplete: an incomplete factor of the present state, in a tenth of the memory of a factor.
  * `auto` takes the factor for small bodies, while it has fewer than 1.5 million entries; for strong contrasts of
  * stiffness up to 5,000 nodes; and wherever multigrid cannot be had; else multigrid. Jacobi is never chosen: it is for
  * comparison, and for bodies whose elements change faster than levels can be made.
  *
- * Deterministic: a refreshed factor takes effect after a simulated time that follows from its operation count, never
- * from the clock. Thread: [load] to make, then [sim]. */
+ * When solves need too many iterations, a newer factor or newer levels are made on a spare thread. Deterministic: they
+ * take effect after a simulated time that follows from their operation count, never from the clock. Thread: [load] to
+ * make, then [sim]. */
 #ifndef PAL_SIM_IMPLICIT_PRECONDITIONER_H
 #define PAL_SIM_IMPLICIT_PRECONDITIONER_H
 #include "server/num/cholesky.h"
@@ -40,10 +40,10 @@ typedef struct pal_preconditioner {
     pal_hex_multigrid multigrid;
     double *inverse; /* jacobi [n_dof][9] */
     double *work;    /* [n_dof][3] */
-    double *next;    /* quat at the factor in progress [n_dof][4] */
+    double *next;    /* quat of those in progress [n_dof][4] */
     bool single;     /* the factor is in single precision */
-    bool refreshed;  /* the factor is newer than the one of the last update */
-    bool pending;    /* a factor is in progress */
+    bool refreshed;  /* factor or levels are newer than the last update */
+    bool pending;    /* newer ones are in progress */
     double left_s;   /* simulated time until it takes effect, or until another refresh may start; below 0: now */
     int n_update;    /* factors or levels made since load */
     double analyse_s, update_s;
@@ -63,7 +63,7 @@ pal_err pal_preconditioner_make(const pal_preconditioner_options *options, pal_s
 void pal_preconditioner_destroy(pal_preconditioner *p);
 
 /* takes the system's coefficients and last linearise, at the present rotations; a refresh in progress is dropped.
- * NUMERIC, MEMORY: a factor in use stays */
+ * NUMERIC, MEMORY: a factor in use stays; of the other kinds no solve may follow */
 pal_err pal_preconditioner_update(pal_preconditioner *p);
 /* declares what is in use to be of the body at rest, not at the present rotations */
 void pal_preconditioner_set_rest(pal_preconditioner *p);
@@ -78,7 +78,7 @@ static inline bool pal_preconditioner_ready(const pal_preconditioner *p)
 /* starts a factor or levels on a spare thread, of the system as it is or, at_rest, as of rest; false: not ready, or of
  * another kind */
 bool pal_preconditioner_refresh(pal_preconditioner *p, bool at_rest);
-/* once per sub-step: adopts a factor that is due, and waits for it if necessary */
+/* once per sub-step: adopts what is due, and waits for it if necessary */
 void pal_preconditioner_step(pal_preconditioner *p, double dt_s);
 /* sets sizes and times of a report */
 void pal_preconditioner_report(const pal_preconditioner *p, pal_solve_report *out);

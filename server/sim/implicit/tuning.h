@@ -41,24 +41,21 @@
 #define PAL_FREQUENCY_SHIFT 1e-12
 #define PAL_FREQUENCY_ZERO  1e-10
 
-/* stiffest element over the softest, above which a factor is best up to PAL_MULTIGRID_NODES: multigrid takes 10
- * iterations at 100 and 74 at 10,000 (tests/sim/implicit/test_preconditioner.c) */
+/* stiffest element over the softest, above which a factor is best up to PAL_MULTIGRID_NODES: multigrid takes 17
+ * iterations at 100 and 34 at 10,000, for 10 without (tests/sim/implicit/test_preconditioner.c) */
 #define PAL_MULTIGRID_CONTRAST 100
-/* entries of a factor that solves faster than multigrid: 6 MB, which stay in a cache of the second level (tests/bench)
- */
+/* entries of a factor that solves faster than multigrid: 6 MB, most of which stays in the processor's caches
+ * (tests/bench) */
 #define PAL_FACTOR_ENTRIES 1.5e6
 
 enum {
     /* nodes below which a factor is best whatever its pattern, and above which it is not analysed (tests/bench) */
     PAL_MULTIGRID_NODES_MIN = 1000,
     PAL_MULTIGRID_NODES = 5000,
-    /* the coarsest level: a factor that takes a twentieth of a cycle; products that find a largest eigenvalue to a few
-     * per cent (tests/sim/implicit/test_preconditioner.c) */
+    /* the coarsest level: a factor that takes a twentieth of a cycle (tests/sim/implicit/test_preconditioner.c) */
     PAL_COARSEST_NODES = 600,
-    PAL_POWER_ITERATIONS = 15,
-    /* iterations after which the levels of a static solve are made of the present state: they cost as much
-     * (tests/bench)
-     */
+    /* iterations after which the levels of a static solve are made of the present state: they cost as much as these
+     * (tests/bench) */
     PAL_MULTIGRID_ITERATIONS = 20,
     /* products with all nodes, times nodes, that finding an interpolated matrix may take at load, ten seconds of 500
      * operations for a node; forces of a node that finding a stiffness without tangents may take, about a second

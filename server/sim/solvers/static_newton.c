@@ -568,6 +568,8 @@ static void reset(void *self, const pal_body *body)
     solver->part = 0;
     if (solver->system.n_free == 0) return;
     pal_node_rotations_reset(&solver->rotations);
+    pal_compliance_solver_reset(&solver->compliance);
+    if (solver->compliance.hook.solve) pal_preconditioner_rotate(&solver->compliance.preconditioner);
     /* the factor is of another state: rebuild it when it is needed */
     if (solver->linear != LINEAR_PCG && solver->preconditioner.n_update > 1) solver->has_factor = false;
 }

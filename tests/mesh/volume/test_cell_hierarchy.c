@@ -1,5 +1,5 @@
-/* Levels of coarse cells: sizes on a box, linear fields, parts that a slit separates, supports; and that the coarser
- * matrix of multigrid has the energy of the interpolated field. */
+/* Levels of coarse cells: sizes on a box, linear fields, parts that a slit separates, loose cells, supports; and that
+ * the matrix of a coarse cell has the energy of the interpolated field. */
 #include "server/mesh/volume/cell_hierarchy.h"
 #include "tests/check.h"
 #include "tests/fixtures/random.h"
@@ -81,7 +81,7 @@ static bool hollow(const int at[3])
 }
 
 /* places of coarse nodes, in finer edges, from the places of cells */
-static double *coarse_places(const body *b, const pal_grid_level *level, const int32_t *finer_place)
+static double *coarse_places(const pal_grid_level *level, const int32_t *finer_place)
 {
     double *x = malloc(sizeof *x * 3 * (size_t)level->n_node);
     for (int g = 0; g < level->n_cell && x; g++)
@@ -89,7 +89,6 @@ static double *coarse_places(const body *b, const pal_grid_level *level, const i
             for (int i = 0; i < 3; i++)
                 x[3 * level->node[8 * g + c] + i] =
                     2 * (finer_place[3 * level->child[level->first[g]] + i] / 2 + (c >> i & 1));
-    (void)b;
     return x;
 }
 
@@ -101,7 +100,7 @@ static void linear_fields_come_through(void)
     REQUIRE(!build(&b, 60));
     REQUIRE(b.grid.n_level >= 1);
     const pal_grid_level *level = &b.grid.level[0];
-    double *x = coarse_places(&b, level, b.place), worst = 0;
+    double *x = coarse_places(level, b.place), worst = 0;
     REQUIRE(x != NULL);
     for (int i = 0; i < b.n_node; i++) {
         double mean[3] = {0};
@@ -150,6 +149,46 @@ static void a_slit_stays_open_on_every_level(void)
         free(part);
     }
     drop(&whole), drop(&slit), drop(&parted);
+}
+
+/* cells that share no node, as after many cuts, all in one block: a level of them would be no coarser */
+static void loose_cells_make_no_levels(void)
+{
+    enum { N = 20000 };
+    static int32_t node[8 * N], place[3 * N];
+    static uint8_t fixed[8 * N];
+    for (int i = 0; i < 8 * N; i++) node[i] = i;
+    pal_arena *arena = pal_arena_create(1 << 16, true);
+    pal_grid_hierarchy grid;
+    const pal_lattice_cells cells = {N, 8 * N, node, place, fixed};
+    REQUIRE(arena && !pal_cell_hierarchy_make(&cells, 100, arena, &grid));
+    CHECK_INT(grid.n_level, 0);
+    /* every cell hangs together with the next one by a node: one group, which is one coarse cell */
+    for (int i = 1; i < N; i++) node[8 * i] = node[8 * i - 1];
+    REQUIRE(!pal_cell_hierarchy_make(&cells, 100, arena, &grid));
+    CHECK_INT(grid.n_level, 1);
+    CHECK_INT(grid.level[0].n_cell, 1);
+    CHECK_INT(grid.level[0].n_node, 8);
+    pal_arena_destroy(arena);
+}
+
+/* the finer nodes of a node are those that are interpolated from it */
+static void finer_nodes_are_listed(void)
+{
+    body b;
+    make(&b, (int[3]){9, 8, 5}, hollow, 4, 3);
+    REQUIRE(!build(&b, 60));
+    const pal_grid_level *level = &b.grid.level[0];
+    CHECK_INT(level->begin[level->n_node], level->start[b.n_node]);
+    for (int i = 0; i < level->n_node; i++)
+        for (int32_t k = level->begin[i]; k < level->begin[i + 1]; k++) {
+            const int32_t finer = level->finer[k];
+            int n = 0;
+            for (int32_t m = level->start[finer]; m < level->start[finer + 1]; m++) n += level->from[m] == i;
+            CHECK_INT(n, 1);
+            if (k > level->begin[i]) CHECK(level->finer[k - 1] < finer);
+        }
+    drop(&b);
 }
 
 static void held_nodes_have_no_part(void)
@@ -202,6 +241,8 @@ int main(void)
     RUN(a_box_has_the_lattices_of_half_as_many);
     RUN(linear_fields_come_through);
     RUN(a_slit_stays_open_on_every_level);
+    RUN(loose_cells_make_no_levels);
+    RUN(finer_nodes_are_listed);
     RUN(held_nodes_have_no_part);
     RUN(a_coarse_cell_has_the_energy_of_its_parts);
     return check_report();
