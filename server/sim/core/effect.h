@@ -84,8 +84,8 @@ typedef struct pal_tangent {
      * that its loads in body->load and its stiffness have changed: the solver solves the sub-step again from where it
      * began. A component asks for that a bounded number of times */
     bool (*settle)(void *self, pal_step *step, const double *moved, bool last);
-    /* voxel hexahedra that are all of the component but its recovery, for preconditioners in single precision; NULL, or
-     * a NULL answer: it has other elements or another law than linear or corotational. [load] */
+    /* voxel hexahedra that are all of the component but its recovery, for preconditioners in single precision; NULL:
+     * it has other elements. [load] */
     const struct pal_elastic_hexes *(*cubes)(const void *self);
 } pal_tangent;
 

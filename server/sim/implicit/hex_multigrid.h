@@ -1,11 +1,11 @@
-/* Multigrid preconditioner of a body of voxel hexahedra (linear or corotational law): A = mass M + stiff K without
- * contact. The finest level has no matrix: it multiplies in single precision with the present rotations, and smooths in
- * place (num/multigrid.h has the smoother and the coarser levels). The coarser levels are those of the state at the
- * last update or refresh, warped to the present one (warp.h): z = W P A1^-1 P' W' r. The number of iterations of
- * conjugate gradients does not grow with the number of nodes: 10 or 11 to 1e-6
- * (tests/sim/implicit/test_preconditioner.c). Memory: the caller's arena, and the heap for the coarser levels, in make
- * and in the first refresh, whose factor of the coarsest level uses it in every update. Thread: [load] to make, then
- * [sim]. */
+/* Multigrid preconditioner of a body of voxel hexahedra: A = mass M + stiff K without contact. K is the stiffness at
+ * rest, turned by the elements' rotations: the corotational tangent, and near the neo-Hookean one. The finest level has
+ * no matrix: it multiplies in single precision with the present rotations, and smooths in place (num/multigrid.h has
+ * the smoother and the coarser levels). The coarser levels are those of the state at the last update or refresh, warped
+ * to the present one (warp.h): z = W P A1^-1 P' W' r. The number of iterations of conjugate gradients does not grow
+ * with the number of nodes: 10 or 11 to 1e-6 (tests/sim/implicit/test_preconditioner.c). Memory: the caller's arena,
+ * and the heap for the coarser levels, in make and in the first refresh, whose factor of the coarsest level uses it in
+ * every update. Thread: [load] to make, then [sim]. */
 #ifndef PAL_SIM_IMPLICIT_HEX_MULTIGRID_H
 #define PAL_SIM_IMPLICIT_HEX_MULTIGRID_H
 #include "server/base/spare_thread.h"

@@ -27,7 +27,6 @@ static const pal_elastic_hexes *find_cubes(const pal_system *system)
         if (!tangent || !tangent->multiply) continue;
         if (cubes || !tangent->cubes) return NULL;
         cubes = tangent->cubes(system->force[i].self);
-        if (!cubes) return NULL;
     }
     return cubes;
 }
@@ -80,7 +79,7 @@ static pal_err choose(pal_preconditioner *p, const pal_elastic_hexes *cubes, pal
     const pal_body *body = p->system->body;
     p->kind = PAL_PRECONDITION_FACTOR;
     if (!cubes)
-        snprintf(p->reason, sizeof p->reason, "its elements are no voxel hexahedra of linear or corotational law");
+        snprintf(p->reason, sizeof p->reason, "its elements are no voxel hexahedra");
     else if (body->n_node < PAL_MULTIGRID_NODES_MIN)
         snprintf(p->reason, sizeof p->reason, "it has only %d nodes", body->n_node);
     if (p->reason[0]) return PAL_ERR_OK;
@@ -110,11 +109,8 @@ static pal_err make_multigrid(pal_preconditioner *p, const pal_elastic_hexes *cu
 {
     const pal_body *body = p->system->body;
     if (!cubes)
-        return PAL_REFUSE(
-            diag,
-            "body \"%s\": a multigrid preconditioner is for voxel hexahedra of linear or corotational law; "
-            "take \"factor\"",
-            body->name);
+        return PAL_REFUSE(diag, "body \"%s\": a multigrid preconditioner is for voxel hexahedra; take \"factor\"",
+                          body->name);
     if (like) p->levels = like->levels, p->shares = true;
     if (!p->levels) PAL_TRY(make_levels(p, cubes, arena));
     if (p->levels->grid.n_level == 0)
