@@ -119,6 +119,7 @@ int pal_contact_points_collect(pal_contact_points *points, const pal_body *body,
         if (run < points->sample.n_run && i == points->sample.n_vertex + points->sample.run[run])
             run = next_run(points, run, &i);
         if (i == points->sample.n_point) break;
+        if (is_outside(points, i - points->sample.n_vertex)) continue;
         const int32_t *corner = points->sample.corner + 3 * (size_t)(i - points->sample.n_vertex);
         const float *share = points->sample.share + 3 * (size_t)(i - points->sample.n_vertex);
         double p[3] = {0};

@@ -85,10 +85,11 @@ static pal_err allocate(const pal_body *body, pal_arena *arena, int n_sample, pa
     t->area_m2 = PAL_NEW(arena, double, n_vertex + room);
     t->fan_start = PAL_NEW(arena, int32_t, n_vertex);
     t->fan_end = PAL_NEW(arena, int32_t, n_vertex);
-    t->run = PAL_NEW(arena, int32_t, n_tri + 1);
+    if (body->active) t->run = PAL_NEW(arena, int32_t, n_tri + 1);
     t->fan = PAL_NEW(arena, int32_t, 3 * n_tri);
     t->tri_mark = PAL_NEW(arena, uint32_t, n_tri);
-    return t->corner && t->share && t->area_m2 && t->fan_start && t->fan_end && t->run && t->fan && t->tri_mark
+    return t->corner && t->share && t->area_m2 && t->fan_start && t->fan_end && (t->run || !body->active) && t->fan &&
+                   t->tri_mark
                ? PAL_ERR_OK
                : PAL_ERR_MEMORY;
 }
@@ -106,12 +107,12 @@ static int make_samples(const pal_surface *surface, pal_contact_samples *t)
             for (int c = 0; c < 3; c++) t->area_m2[corner[c]] += area / 3;
             continue;
         }
-        t->run[t->n_run++] = k;
+        if (t->run) t->run[t->n_run++] = k;
         int made = sample(t->corner + 3 * (size_t)k, t->share + 3 * (size_t)k, corner, n);
         for (int j = 0; j < made; j++) t->area_m2[t->n_vertex + k + j] = area / made;
         k += made;
     }
-    t->run[t->n_run] = k;
+    if (t->run) t->run[t->n_run] = k;
     return k;
 }
 

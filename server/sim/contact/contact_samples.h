@@ -16,7 +16,7 @@ typedef struct pal_contact_samples {
     double *area_m2;                    /* rest area that each point stands for   [max_point]               */
     int32_t *fan_start, *fan_end, *fan; /* triangles around shown vertices: fan[start..end-1] [n_vertex] */
     uint32_t *tri_mark, mark;           /* sampled in this step                               [n_tri]    */
-    /* first fixed sample of each triangle that has some, and one past the last */
+    /* adaptive surfaces: first fixed sample of each triangle that has some, and one past the last; else NULL */
     int n_run;
     int32_t *run;      /* minus n_vertex [n_run + 1]                   */
     uint64_t revision; /* of the triangles that all this belongs to    */

@@ -126,7 +126,7 @@ PAL_INLINE double pal_spring_run(const pal_spring_set *set, pal_node_order *node
         const int b = i / (PAL_LANES / PAL_WIDE), lane = PAL_WIDE * i;
         const pal_wide w = pal_wide_load(set->w + lane);
         if (lane % PAL_LANES != 0 && !pal_wide_any(w != 0)) continue; /* the end of a block may be empty */
-        int32_t base[PAL_CORNERS]; /* a copy, which the stores below cannot change */
+        int32_t base[PAL_CORNERS];                                    /* a copy, which the stores below cannot change */
         for (int c = 0; c < n_corner; c++) {
             base[c] = set->simd_blocks.base[n_corner * b + c] + lane % PAL_LANES;
             p[c][0] = x + base[c], p[c][1] = y + base[c], p[c][2] = z + base[c];
