@@ -5,10 +5,13 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { ALIGN = 64 };
+
 typedef struct block {
     struct block *older;
     size_t size, used;
-    uint8_t *bytes;
+    void *heap;     /* what the heap gave           */
+    uint8_t *bytes; /* the first multiple of ALIGN in it */
 } block;
 
 struct pal_arena {
@@ -17,26 +20,35 @@ struct pal_arena {
     bool grows;
 };
 
+/* zero bytes: calloc knows which pages the system gives zeroed and leaves them untouched */
 static block *block_create(size_t size)
 {
     block *b = malloc(sizeof *b);
     if (!b) return NULL;
-    b->bytes = aligned_alloc(64, size);
-    if (!b->bytes) {
+    b->heap = size + ALIGN > size ? calloc(1, size + ALIGN) : NULL;
+    if (!b->heap) {
         free(b);
         return NULL;
     }
+    b->bytes = (uint8_t *)b->heap + (ALIGN - (uintptr_t)b->heap % ALIGN) % ALIGN;
     b->older = NULL;
     b->size = size;
     b->used = 0;
     return b;
 }
 
+/* writes to every page */
+static void touch(block *b)
+{
+    enum { PAGE = 4096 };
+    for (size_t i = 0; i < b->size; i += PAGE) *(volatile uint8_t *)(b->bytes + i) = 0;
+}
+
 pal_arena *pal_arena_create(size_t n_byte, bool grows)
 {
-    size_t size = (n_byte + 63) & ~(size_t)63;
+    size_t size = (n_byte + ALIGN - 1) & ~(size_t)(ALIGN - 1);
     if (size < n_byte) return NULL;
-    if (size == 0) size = 64;
+    if (size == 0) size = ALIGN;
     pal_arena *arena = malloc(sizeof *arena);
     if (!arena) return NULL;
     *arena = (pal_arena){.newest = block_create(size), .block_size = size, .grows = grows};
@@ -44,7 +56,7 @@ pal_arena *pal_arena_create(size_t n_byte, bool grows)
         free(arena);
         return NULL;
     }
-    if (!grows) memset(arena->newest->bytes, 0, size);
+    if (!grows) touch(arena->newest);
     return arena;
 }
 
@@ -53,7 +65,7 @@ void pal_arena_destroy(pal_arena *arena)
     if (!arena) return;
     for (block *b = arena->newest, *older; b; b = older) {
         older = b->older;
-        free(b->bytes);
+        free(b->heap);
         free(b);
     }
     free(arena);
@@ -61,7 +73,7 @@ void pal_arena_destroy(pal_arena *arena)
 
 void *pal_arena_alloc(pal_arena *arena, size_t n_byte)
 {
-    size_t size = (n_byte + 63) & ~(size_t)63;
+    size_t size = (n_byte + ALIGN - 1) & ~(size_t)(ALIGN - 1);
     if (size < n_byte) return NULL;
     block *b = arena->newest;
     if (size > b->size - b->used) {
@@ -74,7 +86,8 @@ void *pal_arena_alloc(pal_arena *arena, size_t n_byte)
     void *bytes = b->bytes + b->used;
     b->used += size;
     arena->allocated += size;
-    memset(bytes, 0, size);
+    /* a growing arena gives its bytes out once, and they are zero */
+    if (!arena->grows) memset(bytes, 0, size);
     return bytes;
 }
 

@@ -1,6 +1,7 @@
 /* Arena memory: many allocations, one free. It has two uses: the memory of a world, which grows at load and is freed
  * whole, and the scratch memory of a step, a fixed block that is emptied after every sub-step, so that a step makes no
- * heap call. Thread: an arena belongs to one thread at a time. */
+ * heap call. Pages of a growing arena that nobody writes to take no memory: room for the worst case, as for contact of
+ * all of a surface, costs what is used of it. Thread: an arena belongs to one thread at a time. */
 #ifndef PAL_BASE_ARENA_H
 #define PAL_BASE_ARENA_H
 #include "server/base/err.h"

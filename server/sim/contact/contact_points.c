@@ -19,6 +19,7 @@ pal_err pal_contact_points_make(const pal_body *body, double spacing_m, int max_
     t->live_mark = PAL_NEW(arena, uint32_t, n_vertex);
     t->frame_mark = PAL_NEW(arena, uint32_t, n_frame);
     t->seen = PAL_NEW(arena, uint32_t, n_vertex);
+    t->sides = PAL_NEW(arena, uint8_t, n_vertex);
 
     t->slot = PAL_NEW(arena, int32_t, n_slot);
     t->node = PAL_NEW(arena, int32_t, n_node);
@@ -31,8 +32,8 @@ pal_err pal_contact_points_make(const pal_body *body, double spacing_m, int max_
     t->state = PAL_NEW(arena, double, 6 * n_slot);
     t->force = PAL_NEW(arena, double, 3 * n_node);
     bool all = PAL_NEW_DOUBLES(arena, 3 * n_vertex, &t->x, &t->v) && t->live && t->frame && t->live_mark &&
-               t->frame_mark && t->seen && t->slot && t->node && t->slot_mark && t->node_mark && t->tool_mark &&
-               t->spin && t->spin_mark && t->face && t->state && t->force;
+               t->frame_mark && t->seen && t->sides && t->slot && t->node && t->slot_mark && t->node_mark &&
+               t->tool_mark && t->spin && t->spin_mark && t->face && t->state && t->force;
     return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
@@ -67,20 +68,27 @@ static inline double distance2(const double p[3], const double a[3], const doubl
     return x * x + y * y + z * z;
 }
 
-/* the first run of fixed samples, from this one on, whose triangle meets the box: *point is its first point, or the
- * first passing one; returns the run behind it */
-static int next_run(const pal_contact_points *points, const pal_body *body, const float low[3], const float high[3],
-                    int run, int *point)
+/* on which sides of a box a point is, a bit each: a triangle whose corners share one, and all of its samples, are
+ * outside the box */
+static uint8_t sides_of(const float p[3], const float low[3], const float high[3])
 {
-    for (; run < points->sample.n_run; run++) {
-        const int32_t *corner = points->sample.corner + 3 * (size_t)points->sample.run[run];
-        const float *p = body->display.shown + 3 * (size_t)corner[0], *q = body->display.shown + 3 * (size_t)corner[1],
-                    *r = body->display.shown + 3 * (size_t)corner[2];
-        bool meets = true;
-        for (int c = 0; c < 3; c++)
-            meets &= fminf(p[c], fminf(q[c], r[c])) <= high[c] && fmaxf(p[c], fmaxf(q[c], r[c])) >= low[c];
-        if (meets) break;
-    }
+    unsigned sides = 0;
+    for (unsigned c = 0; c < 3; c++)
+        sides |= (unsigned)(p[c] < low[c]) << (2 * c) | (unsigned)(p[c] > high[c]) << (2 * c + 1);
+    return (uint8_t)sides;
+}
+
+static bool is_outside(const pal_contact_points *points, int sample)
+{
+    const int32_t *corner = points->sample.corner + 3 * (size_t)sample;
+    return points->sides[corner[0]] & points->sides[corner[1]] & points->sides[corner[2]];
+}
+
+/* the first run of fixed samples, from this one on, whose triangle may meet the box: *point is its first point, or the
+ * first passing one; returns the run behind it */
+static int next_run(const pal_contact_points *points, int run, int *point)
+{
+    while (run < points->sample.n_run && is_outside(points, points->sample.run[run])) run++;
     *point = points->sample.n_vertex + points->sample.run[run];
     return run < points->sample.n_run ? run + 1 : run;
 }
@@ -101,9 +109,7 @@ int pal_contact_points_collect(pal_contact_points *points, const pal_body *body,
     for (int k = 0; k < n_vertex; k++) {
         int i = body->active ? body->active[k] : k;
         const float *s = body->display.shown + 3 * (size_t)i;
-        if (!((s[0] >= low[0]) & (s[0] <= high[0]) & (s[1] >= low[1]) & (s[1] <= high[1]) & (s[2] >= low[2]) &
-              (s[2] <= high[2])))
-            continue;
+        if ((points->sides[i] = sides_of(s, low, high))) continue;
         if (!(distance2((double[3]){(double)s[0], (double)s[1], (double)s[2]}, a, ab, per_ab2) <= reach2)) continue;
         make_live(points, body, i);
         list[n++] = i;
@@ -111,8 +117,9 @@ int pal_contact_points_collect(pal_contact_points *points, const pal_body *body,
     pal_contact_samples_add_stretched(&points->sample, body, list, n);
     for (int i = points->sample.n_vertex, run = 0; i < points->sample.n_point; i++) {
         if (run < points->sample.n_run && i == points->sample.n_vertex + points->sample.run[run])
-            run = next_run(points, body, low, high, run, &i);
+            run = next_run(points, run, &i);
         if (i == points->sample.n_point) break;
+        if (is_outside(points, i - points->sample.n_vertex)) continue;
         const int32_t *corner = points->sample.corner + 3 * (size_t)(i - points->sample.n_vertex);
         const float *share = points->sample.share + 3 * (size_t)(i - points->sample.n_vertex);
         double p[3] = {0};

@@ -22,6 +22,7 @@ typedef struct pal_contact_points {
     int32_t *live, *frame;                  /* [n_live] [n_frame]                                      */
     uint32_t *live_mark, *frame_mark, mark; /* a vertex or frame is live when its mark is `mark`       */
     uint32_t *seen;                         /* sub-step in which x was last written [n_vertex]         */
+    uint8_t *sides;                         /* of the last search's box on which vertices are [n_vertex] */
     double *x, *v;                          /* of live vertices, by vertex: m, m/s [n_vertex][3] each  */
 
     /* slots (frames of the skin, or nodes without one) in use, and the nodes that their motion depends on */

@@ -57,16 +57,6 @@ PAL_INLINE pal_v8 pal_sqrt8(pal_v8 q)
     const pal_v8 floor = 1e-300 - (pal_v8){0};
     return q * pal_inverse_sqrt8(pal_select8(q < floor, floor, q));
 }
-/* length of the cross product a x b */
-PAL_INLINE pal_v8 pal_cross_length8(const pal_v8 a[3], const pal_v8 b[3])
-{
-    pal_v8 x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
-    return pal_sqrt8(x * x + y * y + z * z);
-}
-PAL_INLINE pal_v8 pal_length8(const pal_v8 a[3])
-{
-    return pal_sqrt8(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
-}
 
 /* slots of a loose block */
 PAL_INLINE const int32_t *pal_block_nodes(const pal_simd_blocks *blocks, int b)
@@ -122,14 +112,4 @@ PAL_INLINE void pal_block_close(const pal_simd_blocks *blocks, const pal_node_or
                 order->f[(size_t)d * (size_t)order->n_slot + (size_t)node[c * PAL_LANES + l]] += v->f_loose[c][d][l];
 }
 
-/* the forces on corners 1, 2, 3 into slots->f, minus their sum on corner 0, lane by lane */
-PAL_INLINE void pal_loose_add(pal_node_order *node_order, const int32_t *node, int n_corner, pal_v8 f[][3])
-{
-    for (int c = 1; c < n_corner; c++)
-        for (int l = 0; l < PAL_LANES; l++)
-            for (int d = 0; d < 3; d++) {
-                node_order->f[d * node_order->n_slot + node[c * PAL_LANES + l]] += f[c - 1][d][l];
-                node_order->f[d * node_order->n_slot + node[l]] -= f[c - 1][d][l];
-            }
-}
 #endif

@@ -65,6 +65,24 @@ PAL_INLINE pal_wide pal_wide_sqrt(pal_wide q)
     for (int l = 0; l < PAL_WIDE; l++) q[l] = sqrt(q[l]);
     return q;
 }
+/* as pal_inverse_sqrt8 */
+PAL_INLINE pal_wide pal_wide_inverse_sqrt(pal_wide q)
+{
+    pal_wide half = 0.5 * q, r = (pal_wide)(0x5fe6eb50c7b537a9 - ((pal_wide_mask)q >> 1));
+    for (int k = 0; k < 4; k++) r = r * (1.5 - half * r * r);
+    return r;
+}
+/* lengths of a and of the cross product a x b, to a few units of the last place */
+PAL_INLINE pal_wide pal_wide_length(const pal_wide a[3])
+{
+    const pal_wide floor = pal_wide_of(1e-300), q = a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
+    return q * pal_wide_inverse_sqrt(pal_wide_select(q < floor, floor, q));
+}
+PAL_INLINE pal_wide pal_wide_cross_length(const pal_wide a[3], const pal_wide b[3])
+{
+    const pal_wide n[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+    return pal_wide_length(n);
+}
 /* r = a b, r = a' b, r = a b'; r apart from a and b */
 PAL_INLINE void pal_wide_mul(pal_wide r[9], const pal_wide a[9], const pal_wide b[9])
 {

@@ -55,14 +55,14 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 }
 
 /* with q = (l/l0)^2 and r = 1/sqrt(q): C (d/l)/l0 = (1 - r) d/l0^2 */
-PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *min)
+PAL_INLINE void kernel(const double *p[][3], pal_wide w, pal_wide kq, pal_wide f[][3], pal_wide *min)
 {
-    const pal_v8 floor = PAL_ROUNDING * PAL_ROUNDING - (pal_v8){0}, one = 1 - (pal_v8){0};
-    pal_v8 dx = pal_load8(p[1][0]) - pal_load8(p[0][0]), dy = pal_load8(p[1][1]) - pal_load8(p[0][1]),
-           dz = pal_load8(p[1][2]) - pal_load8(p[0][2]), w2 = w * w;
-    pal_v8 q = (dx * dx + dy * dy + dz * dz) * w2, known = pal_select8(w > 0, q, one);
-    *min = pal_select8(known < *min, known, *min);
-    pal_v8 s = kq * w2 * (pal_inverse_sqrt8(pal_select8(q < floor, floor, q)) - 1);
+    const pal_wide floor = PAL_ROUNDING * PAL_ROUNDING - (pal_wide){0}, one = 1 - (pal_wide){0};
+    pal_wide dx = pal_wide_load(p[1][0]) - pal_wide_load(p[0][0]), dy = pal_wide_load(p[1][1]) - pal_wide_load(p[0][1]),
+             dz = pal_wide_load(p[1][2]) - pal_wide_load(p[0][2]), w2 = w * w;
+    pal_wide q = (dx * dx + dy * dy + dz * dz) * w2, known = pal_wide_select(w > 0, q, one);
+    *min = pal_wide_select(known < *min, known, *min);
+    pal_wide s = kq * w2 * (pal_wide_inverse_sqrt(pal_wide_select(q < floor, floor, q)) - 1);
     f[0][0] = s * dx, f[0][1] = s * dy, f[0][2] = s * dz;
 }
 

@@ -23,16 +23,16 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 }
 
 /* with q = (A/A0)^2 and r = 1/sqrt(q): C n/|n| = (1 - r) n w, and the gradients are crosses of n with the edges */
-PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *min)
+PAL_INLINE void kernel(const double *p[][3], pal_wide w, pal_wide kq, pal_wide f[][3], pal_wide *min)
 {
     (void)min;
-    const pal_v8 floor = PAL_ROUNDING * PAL_ROUNDING - (pal_v8){0};
-    pal_v8 x = pal_load8(p[0][0]), y = pal_load8(p[0][1]), z = pal_load8(p[0][2]), w2 = w * w;
-    pal_v8 ax = pal_load8(p[1][0]) - x, ay = pal_load8(p[1][1]) - y, az = pal_load8(p[1][2]) - z;
-    pal_v8 bx = pal_load8(p[2][0]) - x, by = pal_load8(p[2][1]) - y, bz = pal_load8(p[2][2]) - z;
-    pal_v8 nx = ay * bz - az * by, ny = az * bx - ax * bz, nz = ax * by - ay * bx;
-    pal_v8 q = (nx * nx + ny * ny + nz * nz) * w2;
-    pal_v8 t = kq * w2 * (pal_inverse_sqrt8(pal_select8(q < floor, floor, q)) - 1);
+    const pal_wide floor = PAL_ROUNDING * PAL_ROUNDING - (pal_wide){0};
+    pal_wide x = pal_wide_load(p[0][0]), y = pal_wide_load(p[0][1]), z = pal_wide_load(p[0][2]), w2 = w * w;
+    pal_wide ax = pal_wide_load(p[1][0]) - x, ay = pal_wide_load(p[1][1]) - y, az = pal_wide_load(p[1][2]) - z;
+    pal_wide bx = pal_wide_load(p[2][0]) - x, by = pal_wide_load(p[2][1]) - y, bz = pal_wide_load(p[2][2]) - z;
+    pal_wide nx = ay * bz - az * by, ny = az * bx - ax * bz, nz = ax * by - ay * bx;
+    pal_wide q = (nx * nx + ny * ny + nz * nz) * w2;
+    pal_wide t = kq * w2 * (pal_wide_inverse_sqrt(pal_wide_select(q < floor, floor, q)) - 1);
     nx *= t, ny *= t, nz *= t;
     f[0][0] = by * nz - bz * ny, f[0][1] = bz * nx - bx * nz, f[0][2] = bx * ny - by * nx;
     f[1][0] = ny * az - nz * ay, f[1][1] = nz * ax - nx * az, f[1][2] = nx * ay - ny * ax;
@@ -40,20 +40,20 @@ PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3],
 
 /* |g_a| = e_a w with e_a the edge opposite the corner, w = 1/(2 A0). The second derivative of A stiffens where C > 0:
  * row sums C w (e_a sum e_b/|n| + 2) at most */
-PAL_INLINE void bound_kernel(const double *p[][3], pal_v8 w, pal_v8 kq, bool bend, pal_v8 bound[])
+PAL_INLINE void bound_kernel(const double *p[][3], pal_wide w, pal_wide kq, bool bend, pal_wide bound[])
 {
-    pal_v8 e[3][3], length[3], along = kq * w * w, flat = w - w;
+    pal_wide e[3][3], length[3], along = kq * w * w, flat = w - w;
     for (int c = 0; c < 3; c++) {
-        for (int d = 0; d < 3; d++) e[c][d] = pal_load8(p[(c + 2) % 3][d]) - pal_load8(p[(c + 1) % 3][d]);
-        length[c] = pal_length8(e[c]);
+        for (int d = 0; d < 3; d++) e[c][d] = pal_wide_load(p[(c + 2) % 3][d]) - pal_wide_load(p[(c + 1) % 3][d]);
+        length[c] = pal_wide_length(e[c]);
     }
     if (bend) {
-        pal_v8 size = pal_cross_length8(e[0], e[1]), c = size * w - 1;
-        pal_v8 cw = kq * w * pal_select8(c > 0, c, flat);
-        along += cw / pal_select8(c > 0, size, flat + 1);
+        pal_wide size = pal_wide_cross_length(e[0], e[1]), c = size * w - 1;
+        pal_wide cw = kq * w * pal_wide_select(c > 0, c, flat);
+        along += cw / pal_wide_select(c > 0, size, flat + 1);
         flat = 2 * cw;
     }
-    pal_v8 sum = length[0] + length[1] + length[2];
+    pal_wide sum = length[0] + length[1] + length[2];
     for (int c = 0; c < 3; c++) bound[c] = along * length[c] * sum + flat;
 }
 

@@ -35,40 +35,40 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     return err ? err : pal_spring_lattice_join(set, build);
 }
 
-PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *min)
+PAL_INLINE void kernel(const double *p[][3], pal_wide w, pal_wide kq, pal_wide f[][3], pal_wide *min)
 {
     (void)min;
-    pal_v8 x = pal_load8(p[0][0]), y = pal_load8(p[0][1]), z = pal_load8(p[0][2]);
-    pal_v8 ax = pal_load8(p[1][0]) - x, ay = pal_load8(p[1][1]) - y, az = pal_load8(p[1][2]) - z;
-    pal_v8 bx = pal_load8(p[2][0]) - x, by = pal_load8(p[2][1]) - y, bz = pal_load8(p[2][2]) - z;
-    pal_v8 cx = pal_load8(p[3][0]) - x, cy = pal_load8(p[3][1]) - y, cz = pal_load8(p[3][2]) - z;
-    pal_v8 gx = by * cz - bz * cy, gy = bz * cx - bx * cz, gz = bx * cy - by * cx;
-    pal_v8 t = kq * w * (1 - (ax * gx + ay * gy + az * gz) * w);
+    pal_wide x = pal_wide_load(p[0][0]), y = pal_wide_load(p[0][1]), z = pal_wide_load(p[0][2]);
+    pal_wide ax = pal_wide_load(p[1][0]) - x, ay = pal_wide_load(p[1][1]) - y, az = pal_wide_load(p[1][2]) - z;
+    pal_wide bx = pal_wide_load(p[2][0]) - x, by = pal_wide_load(p[2][1]) - y, bz = pal_wide_load(p[2][2]) - z;
+    pal_wide cx = pal_wide_load(p[3][0]) - x, cy = pal_wide_load(p[3][1]) - y, cz = pal_wide_load(p[3][2]) - z;
+    pal_wide gx = by * cz - bz * cy, gy = bz * cx - bx * cz, gz = bx * cy - by * cx;
+    pal_wide t = kq * w * (1 - (ax * gx + ay * gy + az * gz) * w);
     f[0][0] = t * gx, f[0][1] = t * gy, f[0][2] = t * gz;
     f[1][0] = t * (cy * az - cz * ay), f[1][1] = t * (cz * ax - cx * az), f[1][2] = t * (cx * ay - cy * ax);
     f[2][0] = t * (ay * bz - az * by), f[2][1] = t * (az * bx - ax * bz), f[2][2] = t * (ax * by - ay * bx);
 }
 
 /* |g_a| = 2 |w| (area opposite); the second derivative of V has row sums |C w| (perimeter of the face opposite) */
-PAL_INLINE void bound_kernel(const double *p[][3], pal_v8 w, pal_v8 kq, bool bend, pal_v8 bound[])
+PAL_INLINE void bound_kernel(const double *p[][3], pal_wide w, pal_wide kq, bool bend, pal_wide bound[])
 {
-    pal_v8 e[3][3], f[2][3], zero = w - w, size[4], length[6];
+    pal_wide e[3][3], f[2][3], zero = w - w, size[4], length[6];
     for (int c = 0; c < 3; c++)
-        for (int d = 0; d < 3; d++) e[c][d] = pal_load8(p[c + 1][d]) - pal_load8(p[0][d]);
+        for (int d = 0; d < 3; d++) e[c][d] = pal_wide_load(p[c + 1][d]) - pal_wide_load(p[0][d]);
     for (int c = 0; c < 2; c++)
         for (int d = 0; d < 3; d++) f[c][d] = e[c + 1][d] - e[0][d];
-    size[0] = pal_cross_length8(f[0], f[1]);
-    for (int c = 0; c < 3; c++) size[c + 1] = pal_cross_length8(e[(c + 1) % 3], e[(c + 2) % 3]);
-    pal_v8 sum = kq * w * w * (size[0] + size[1] + size[2] + size[3]);
+    size[0] = pal_wide_cross_length(f[0], f[1]);
+    for (int c = 0; c < 3; c++) size[c + 1] = pal_wide_cross_length(e[(c + 1) % 3], e[(c + 2) % 3]);
+    pal_wide sum = kq * w * w * (size[0] + size[1] + size[2] + size[3]);
     for (int c = 0; c < 4; c++) bound[c] = sum * size[c];
     if (!bend) return;
-    pal_v8 g[3] = {e[1][1] * e[2][2] - e[1][2] * e[2][1], e[1][2] * e[2][0] - e[1][0] * e[2][2],
-                   e[1][0] * e[2][1] - e[1][1] * e[2][0]};
-    pal_v8 c = ((e[0][0] * g[0] + e[0][1] * g[1] + e[0][2] * g[2]) * w - 1) * w, third[3];
-    c = kq * pal_select8(c < 0, zero - c, c);
+    pal_wide g[3] = {e[1][1] * e[2][2] - e[1][2] * e[2][1], e[1][2] * e[2][0] - e[1][0] * e[2][2],
+                     e[1][0] * e[2][1] - e[1][1] * e[2][0]};
+    pal_wide c = ((e[0][0] * g[0] + e[0][1] * g[1] + e[0][2] * g[2]) * w - 1) * w, third[3];
+    c = kq * pal_wide_select(c < 0, zero - c, c);
     /* edges 01 02 03 12 13 23 */
-    for (int k = 0; k < 3; k++) length[k] = pal_length8(e[k]), third[k] = e[2][k] - e[1][k];
-    length[3] = pal_length8(f[0]), length[4] = pal_length8(f[1]), length[5] = pal_length8(third);
+    for (int k = 0; k < 3; k++) length[k] = pal_wide_length(e[k]), third[k] = e[2][k] - e[1][k];
+    length[3] = pal_wide_length(f[0]), length[4] = pal_wide_length(f[1]), length[5] = pal_wide_length(third);
     bound[0] += c * (length[3] + length[4] + length[5]);
     bound[1] += c * (length[1] + length[2] + length[5]);
     bound[2] += c * (length[0] + length[2] + length[4]);

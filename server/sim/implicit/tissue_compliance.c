@@ -233,12 +233,30 @@ static void destroy(void *self)
     pal_rest_preconditioner_destroy(&((pal_tissue_compliance *)self)->preconditioner);
 }
 
-/* for a body whose nodes are its dofs and stay */
-static pal_err make_preconditioner(pal_tissue_compliance *tissue, const pal_system *system, pal_arena *arena)
+/* the preconditioner of the stiffness at rest, which stands in `work` with its values */
+static pal_err factor_rest(pal_tissue_compliance *tissue, const pal_system *system, pal_arena *arena, pal_arena *work)
 {
     const pal_body *body = system->body;
-    PAL_TRY(pal_rest_stiffness_find(system, arena, &tissue->rest));
-    return pal_rest_preconditioner_make(body, &tissue->rest, body->support, arena, &tissue->preconditioner);
+    pal_block_matrix *rest = &tissue->rest;
+    PAL_TRY(pal_rest_stiffness_find(system, work, rest));
+    const size_t n_start = (size_t)rest->n + 1, n_row = (size_t)rest->start[rest->n];
+    int32_t *start = PAL_NEW(arena, int32_t, n_start), *row = PAL_NEW(arena, int32_t, n_row);
+    if (!start || !row) return PAL_ERR_MEMORY;
+    memcpy(start, rest->start, n_start * sizeof *start);
+    memcpy(row, rest->row, n_row * sizeof *row);
+    rest->start = start, rest->row = row;
+    return pal_rest_preconditioner_make(body, rest, body->support, arena, &tissue->preconditioner);
+}
+
+/* for a body whose nodes are its dofs and stay. The factor goes on with the pattern; the values are let go */
+static pal_err make_preconditioner(pal_tissue_compliance *tissue, const pal_system *system, pal_arena *arena)
+{
+    pal_arena *work = pal_arena_create(1 << 20, true);
+    if (!work) return PAL_ERR_MEMORY;
+    const pal_err err = factor_rest(tissue, system, arena, work);
+    tissue->rest.value = NULL;
+    pal_arena_destroy(work);
+    return err;
 }
 
 pal_err pal_tissue_compliance_make(const pal_build *build)

@@ -33,8 +33,8 @@ typedef struct pal_tissue_compliance {
     bool known;                    /* inverse holds for the topology `revision` */
     double *x, *low, *product, *z; /* [n_dof][3] */
     double *inverse, *bound;       /* of the diagonal, m/N [n_dof]; row sums, N/m [n_node] */
-    pal_block_matrix rest;
-    bool preconditioned; /* by `preconditioner` */
+    pal_block_matrix rest;         /* pattern of the stiffness at rest */
+    bool preconditioned;           /* by `preconditioner` */
     pal_rest_preconditioner preconditioner;
     pal_tissue_answer answer[PAL_TISSUE_ANSWERS];
 } pal_tissue_compliance;

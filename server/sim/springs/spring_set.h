@@ -1,19 +1,19 @@
 /* A set of springs of one kind: constraints between 2, 3 or 4 nodes, each with an inverse rest measure w and a weight
  * q, energy E = q k/2 C^2 (spring_law.h). spring_constraint.h has the constraint for one spring; an effect gives it as
- * a kernel for 8 springs, which the loops below inline. Thread: [load] to make, then [sim]. */
+ * a kernel for PAL_WIDE springs, which the loops below inline. Thread: [load] to make, then [sim]. */
 #ifndef PAL_SIM_SPRINGS_SPRING_SET_H
 #define PAL_SIM_SPRINGS_SPRING_SET_H
-#include "server/sim/core/simd.h"
+#include "server/sim/core/simd_wide.h"
 #include "server/sim/springs/spring_law.h"
 
-/* 8 springs with constants k q: p [n_corner][3] points to the coordinates of the corners, 8 lanes each; f [n_corner -
- * 1][3] receives the forces on corners 1, 2, 3 (corner 0 gets minus their sum); the kernel may lower `min` to the
- * minimum of a quantity of its own */
-typedef void (*pal_spring_kernel)(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *min);
+/* PAL_WIDE springs with constants k q: p [n_corner][3] points to the coordinates of the corners, a lane each; f
+ * [n_corner - 1][3] receives the forces on corners 1, 2, 3 (corner 0 gets minus their sum); the kernel may lower `min`
+ * to the minimum of a quantity of its own */
+typedef void (*pal_spring_kernel)(const double *p[][3], pal_wide w, pal_wide kq, pal_wide f[][3], pal_wide *min);
 
-/* Gershgorin row sums of 8 springs at each corner: k q |g_a| sum |g_b|, and with `bend` those of the second derivative
- * of C where it stiffens */
-typedef void (*pal_bound_kernel)(const double *p[][3], pal_v8 w, pal_v8 kq, bool bend, pal_v8 bound[]);
+/* Gershgorin row sums of PAL_WIDE springs at each corner: k q |g_a| sum |g_b|, and with `bend` those of the second
+ * derivative of C where it stiffens */
+typedef void (*pal_bound_kernel)(const double *p[][3], pal_wide w, pal_wide kq, bool bend, pal_wide bound[]);
 
 typedef struct pal_spring_set {
     pal_spring spring;
@@ -101,6 +101,17 @@ PAL_INLINE void pal_spring_damp(const pal_spring_set *set, const pal_body *body,
     }
 }
 
+/* the forces f on corners 1, 2, 3 of PAL_WIDE springs to the slots `node` [n_corner][8], minus their sum on corner 0 */
+PAL_INLINE void pal_spring_add_loose(pal_node_order *node_order, const int32_t *node, int n_corner, pal_wide f[][3])
+{
+    for (int c = 1; c < n_corner; c++)
+        for (int l = 0; l < PAL_WIDE; l++)
+            for (int d = 0; d < 3; d++) {
+                node_order->f[d * node_order->n_slot + node[c * PAL_LANES + l]] += f[c - 1][d][l];
+                node_order->f[d * node_order->n_slot + node[l]] -= f[c - 1][d][l];
+            }
+}
+
 /* forces of all springs, strips first; returns the minimum that the kernel reports, at most 1 */
 PAL_INLINE double pal_spring_run(const pal_spring_set *set, pal_node_order *node_order, pal_spring_kernel kernel,
                                  int n_corner)
@@ -109,37 +120,49 @@ PAL_INLINE double pal_spring_run(const pal_spring_set *set, pal_node_order *node
     const double k = set->spring.k_J;
     double *const fx = node_order->f, *const fy = fx + node_order->n_slot, *const fz = fy + node_order->n_slot;
     const double *const x = node_order->x, *const y = x + node_order->n_slot, *const z = y + node_order->n_slot;
-    pal_v8 f[PAL_CORNERS - 1][3], min = {1, 1, 1, 1, 1, 1, 1, 1};
+    pal_wide f[PAL_CORNERS - 1][3], min = pal_wide_of(1);
     const double *p[PAL_CORNERS][3];
-    for (int b = 0; b < n_strip; b++) {
-        int32_t base[PAL_CORNERS]; /* a copy, which the stores below cannot change */
+    for (int i = 0; i < PAL_LANES / PAL_WIDE * n_strip; i++) {
+        const int b = i / (PAL_LANES / PAL_WIDE), lane = PAL_WIDE * i;
+        const pal_wide w = pal_wide_load(set->w + lane);
+        if (lane % PAL_LANES != 0 && !pal_wide_any(w != 0)) continue; /* the end of a block may be empty */
+        int32_t base[PAL_CORNERS];                                    /* a copy, which the stores below cannot change */
         for (int c = 0; c < n_corner; c++) {
-            base[c] = set->simd_blocks.base[n_corner * b + c];
+            base[c] = set->simd_blocks.base[n_corner * b + c] + lane % PAL_LANES;
             p[c][0] = x + base[c], p[c][1] = y + base[c], p[c][2] = z + base[c];
         }
-        kernel(p, pal_load8(set->w + PAL_LANES * b), k * pal_load8(set->q + PAL_LANES * b), f, &min);
-        pal_v8 sum[3] = {f[0][0], f[0][1], f[0][2]};
+        kernel(p, w, k * pal_wide_load(set->q + lane), f, &min);
+        pal_wide sum[3] = {f[0][0], f[0][1], f[0][2]};
         for (int c = 2; c < n_corner; c++)
             for (int d = 0; d < 3; d++) sum[d] += f[c - 1][d];
-        pal_add8(fx + base[0], -sum[0]), pal_add8(fy + base[0], -sum[1]), pal_add8(fz + base[0], -sum[2]);
+        pal_wide_add(fx + base[0], -sum[0]), pal_wide_add(fy + base[0], -sum[1]), pal_wide_add(fz + base[0], -sum[2]);
         for (int c = 1; c < n_corner; c++) {
-            pal_add8(fx + base[c], f[c - 1][0]);
-            pal_add8(fy + base[c], f[c - 1][1]);
-            pal_add8(fz + base[c], f[c - 1][2]);
+            pal_wide_add(fx + base[c], f[c - 1][0]);
+            pal_wide_add(fy + base[c], f[c - 1][1]);
+            pal_wide_add(fz + base[c], f[c - 1][2]);
         }
     }
-    for (int b = 0; b < set->simd_blocks.n_loose; b++) {
-        const int32_t *node = set->simd_blocks.node + n_corner * PAL_LANES * b;
-        double at[PAL_CORNERS][3][PAL_LANES];
-        pal_loose_load(node_order, node, n_corner, at);
+    for (int lane = PAL_LANES * n_strip; lane < set->simd_blocks.n_lane; lane += PAL_WIDE) {
+        const int32_t *node = pal_block_nodes(&set->simd_blocks, lane / PAL_LANES) + lane % PAL_LANES;
+        double at[PAL_CORNERS][3][PAL_WIDE];
         for (int c = 0; c < n_corner; c++)
-            for (int d = 0; d < 3; d++) p[c][d] = at[c][d];
-        int lane = PAL_LANES * (n_strip + b);
-        kernel(p, pal_load8(set->w + lane), k * pal_load8(set->q + lane), f, &min);
-        pal_loose_add(node_order, node, n_corner, f);
+            for (int d = 0; d < 3; d++) {
+                for (int l = 0; l < PAL_WIDE; l++)
+                    at[c][d][l] = node_order->x[d * node_order->n_slot + node[c * PAL_LANES + l]];
+                p[c][d] = at[c][d];
+            }
+        kernel(p, pal_wide_load(set->w + lane), k * pal_wide_load(set->q + lane), f, &min);
+        pal_spring_add_loose(node_order, node, n_corner, f);
     }
-    for (int l = 1; l < PAL_LANES; l++) min[0] = min[l] < min[0] ? min[l] : min[0];
+    for (int l = 1; l < PAL_WIDE; l++) min[0] = min[l] < min[0] ? min[l] : min[0];
     return min[0];
+}
+
+/* pointers p [n_corner][3] of a block moved to the lanes from `lane` on */
+PAL_INLINE void pal_spring_shift(const double *p[][3], int n_corner, int lane)
+{
+    for (int c = 0; c < n_corner; c++)
+        for (int d = 0; d < 3; d++) p[c][d] += lane;
 }
 
 /* bound [n_node] += the row sums at positions x [n_node][3] */
@@ -147,17 +170,19 @@ PAL_INLINE void pal_spring_bound(const pal_spring_set *set, pal_node_order *node
                                  pal_bound_kernel kernel, int n_corner, double k, bool bend, double *bound)
 {
     const pal_simd_blocks *blocks = &set->simd_blocks;
-    pal_v8 b8[PAL_CORNERS];
+    pal_wide sums[PAL_CORNERS];
     pal_node_order_load(node_order, at);
-    for (int b = 0; b < blocks->n_strip + blocks->n_loose; b++) {
+    for (int lane = 0; lane < blocks->n_lane; lane += PAL_WIDE) {
+        const int b = lane / PAL_LANES, first = lane % PAL_LANES;
         double loose[PAL_CORNERS][3][PAL_LANES];
         const double *p[PAL_CORNERS][3];
         const bool is_loose = pal_block_points(blocks, node_order, b, n_corner, loose, p);
-        const int32_t *node = pal_block_nodes(blocks, b);
-        kernel(p, pal_load8(set->w + PAL_LANES * b), k * pal_load8(set->q + PAL_LANES * b), bend, b8);
+        const int32_t *node = pal_block_nodes(blocks, b) + first;
+        pal_spring_shift(p, n_corner, first);
+        kernel(p, pal_wide_load(set->w + lane), k * pal_wide_load(set->q + lane), bend, sums);
         for (int c = 0; c < n_corner; c++) {
-            if (!is_loose) pal_add8(node_order->f + blocks->base[n_corner * b + c], b8[c]);
-            for (int l = 0; l < PAL_LANES && is_loose; l++) node_order->f[node[c * PAL_LANES + l]] += b8[c][l];
+            if (!is_loose) pal_wide_add(node_order->f + blocks->base[n_corner * b + c] + first, sums[c]);
+            for (int l = 0; l < PAL_WIDE && is_loose; l++) node_order->f[node[c * PAL_LANES + l]] += sums[c][l];
         }
     }
     for (int i = 0; i < node_order->n_node; i++) bound[i] += node_order->f[node_order->slot[i]];

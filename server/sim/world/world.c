@@ -173,15 +173,21 @@ static pal_err make_part(pal_world *w, const pal_body_def *def, int b)
     p->n_vertex = p->n_own = display->n_shown;
     p->n_tri = body->active ? body->dofs.n_slot : display->surface->n_tri;
     float *rest_m = PAL_NEW(w->arena, float, 3 * (size_t)p->n_vertex);
-    int32_t *tri = PAL_NEW(w->arena, int32_t, 3 * (size_t)p->n_tri);
-    if (!rest_m || !tri) return PAL_ERR_MEMORY;
+    if (!rest_m) return PAL_ERR_MEMORY;
     const double *x = display->skin ? display->surface->x : body->node_rest;
     for (int i = 0; i < p->n_vertex; i++) {
         int from = display->skin ? i : display->shown_node[i];
         for (int c = 0; c < 3; c++) rest_m[3 * i + c] = (float)(x[3 * from + c] + body->offset_m[c]);
     }
-    memcpy(tri, body->active ? body->dofs.slot : display->surface->tri, 3 * sizeof *tri * (size_t)p->n_tri);
-    p->rest_m = rest_m, p->tri = tri;
+    p->rest_m = rest_m;
+    p->tri = display->surface->tri;
+    /* the mesh lasts as long as the scene; surfaces of models and components may change */
+    if (display->surface != &def->mesh->surface) {
+        int32_t *tri = PAL_NEW(w->arena, int32_t, 3 * (size_t)p->n_tri);
+        if (!tri) return PAL_ERR_MEMORY;
+        memcpy(tri, body->active ? body->dofs.slot : p->tri, 3 * sizeof *tri * (size_t)p->n_tri);
+        p->tri = tri;
+    }
     p->node_rest_m = body->node_rest;
     pal_copy3(p->offset_m, body->offset_m);
     if (body->tets) p->n_node = body->tets->n_node, p->n_tet = body->tets->n_tet, p->tet = body->tets->tet;

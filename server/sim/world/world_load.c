@@ -51,10 +51,23 @@ static bool stays(const pal_body *body)
     return fixed && !prescribed;
 }
 
+/* nodes of a body without active ones that are looked at together: most have no load */
+enum { TOGETHER = 8 };
+
+static bool are_free(const double *load)
+{
+    int any = 0;
+    for (int i = 0; i < 3 * TOGETHER; i++) any |= load[i] != 0;
+    return !any;
+}
+
 void pal_body_cap_loads(pal_body *body, bool lasting)
 {
     int staying = -1; /* not computed yet */
-    for (int k = 0; k < pal_body_nodes(body); k++) {
+    const int n = pal_body_nodes(body);
+    for (int k = 0; k < n; k++) {
+        while (!body->active && k + TOGETHER <= n && are_free(body->load + 3 * (size_t)k)) k += TOGETHER;
+        if (k == n) break;
         int i = pal_body_point(body, k);
         double *load = body->load + 3 * i, load2 = pal_dot3(load, load);
         if (load2 == 0) continue;
