@@ -249,6 +249,28 @@ static void fresh_levels_save_iterations(void)
     CHECK_NEAR(mean[1], mean[2], 0);
 }
 
+/* edits of the material while levels are made on the spare thread: these are dropped, and every edit makes its own */
+static void an_edit_drops_levels_in_the_making(void)
+{
+    fem_beam b;
+    beam_reference(&b, 6);
+    beam_element(&b, "hex8_bbar", "corotational");
+    pal_entry_put_text(&b.def->solver, "preconditioner", "multigrid", NULL);
+    beam_key(&b, "refresh_iterations", 1);
+    beam_key(&b, "tolerance", 1e-4);
+    REQUIRE(!beam_open(&b, &diag));
+    beam_load_end(&b, 800);
+    pal_material material = b.def->material;
+    for (int k = 0; k < 6; k++) {
+        REQUIRE(!pal_world_step(b.world, 1.0 / 60)); /* its end begins a refresh */
+        CHECK_LE(2, report_of(&b).n_cg);
+        material.density_kg_m3 = k % 2 ? 1000 : 1500;
+        REQUIRE(!pal_world_material(b.world, 0, &material, &diag));
+        CHECK_INT(report_of(&b).n_factor, k + 2);
+    }
+    beam_free(&b);
+}
+
 /* A body with two coarse levels that smooth before the factored one. k: 0 the reference beam, 1 an organ with cut
  * voxels, whose strips of cells have gaps, held at one end and loaded at the other */
 static bool open_large(fem_beam *b, int k, int threads)
@@ -477,6 +499,7 @@ int main(void)
     RUN(an_irregular_body_needs_few_iterations);
     RUN(a_bent_beam_needs_few_iterations);
     RUN(fresh_levels_save_iterations);
+    RUN(an_edit_drops_levels_in_the_making);
     RUN(threads_do_not_change_a_bit);
     RUN(parts_of_a_round_share_no_slot);
     RUN(an_application_is_symmetric_and_positive);
