@@ -328,13 +328,32 @@ static void smooth(matrix *a, pal_team *team, bool from_zero)
                  team);
 }
 
-/* the norm sqrt(d' D d), in which D^-1 A is symmetric */
-static double size_of_direction(const matrix *a)
+float pal_chebyshev_lambda(double (*size_of)(void *user), void (*apply)(void *user, float scale), void *user)
 {
+    double lambda = 1, size = size_of(user);
+    for (int k = 0; k < PAL_POWER_ITERATIONS && size > 0 && isfinite(size); k++) {
+        apply(user, (float)(1 / size));
+        lambda = size = size_of(user);
+    }
+    return (float)(PAL_CHEBYSHEV_SAFE * lambda);
+}
+
+/* the norm sqrt(d' D d), in which D^-1 A is symmetric */
+static double size_of_direction(void *self)
+{
+    const matrix *a = self;
     double sum = 0;
     for (int i = 0; i < a->n; i++)
         for (int c = 0; c < 3 && a->inverse[i] > 0; c++) sum += (double)(a->d[i][c] * a->d[i][c] / a->inverse[i]);
     return sqrt(sum);
+}
+
+/* d = scale D^-1 A d */
+static void apply(void *self, float scale)
+{
+    matrix *a = self;
+    for (int i = 0; i < a->n; i++) a->r[i] = scale * a->inverse[i] * multiply_row(a, i, a->d);
+    memcpy(a->d, a->r, sizeof *a->d * (size_t)a->n);
 }
 
 /* diagonal and largest eigenvalue */
@@ -344,17 +363,9 @@ static void measure(matrix *a, const uint8_t *fixed)
         const vec4 *block = a->value[find(a, i, i)];
         float d = (block[0][0] + block[1][1] + block[2][2]) / 3;
         a->inverse[i] = !fixed[i] && d > 0 ? 1 / d : 0;
-        /* any vector that is not smooth */
-        for (int c = 0; c < 3; c++) a->d[i][c] = a->inverse[i] > 0 ? (float)((7 * i + 3 * c) % 11 - 5) : 0;
+        for (int c = 0; c < 3; c++) a->d[i][c] = a->inverse[i] > 0 ? pal_chebyshev_start(i, c) : 0;
     }
-    double lambda = 1, size = size_of_direction(a);
-    for (int k = 0; k < PAL_POWER_ITERATIONS && size > 0 && isfinite(size); k++) {
-        for (int i = 0; i < a->n; i++) a->d[i] *= (float)(1 / size);
-        for (int i = 0; i < a->n; i++) a->r[i] = a->inverse[i] * multiply_row(a, i, a->d);
-        for (int i = 0; i < a->n; i++) a->d[i] = a->r[i];
-        lambda = size = size_of_direction(a);
-    }
-    a->lambda = (float)(PAL_CHEBYSHEV_SAFE * lambda);
+    a->lambda = pal_chebyshev_lambda(size_of_direction, apply, a);
 }
 
 pal_err pal_multigrid_finish(pal_multigrid *mg)

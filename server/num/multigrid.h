@@ -31,6 +31,15 @@ static inline float pal_chebyshev_take(int i)
     return (float)(8 * i + 4) / (float)(2 * i + 3);
 }
 
+/* The largest eigenvalue of D^-1 A, or a little more, by power iteration on a direction d of the caller: size_of gives
+ * sqrt(d' D d), a norm in which D^-1 A is symmetric; apply sets d = scale D^-1 A d. Before the call d is to be
+ * pal_chebyshev_start at point i and axis c, which is not smooth, and 0 where D is none */
+float pal_chebyshev_lambda(double (*size_of)(void *user), void (*apply)(void *user, float scale), void *user);
+static inline float pal_chebyshev_start(int i, int c)
+{
+    return (float)((7 * i + 3 * c) % 11 - 5);
+}
+
 /* one level of coarse cells, and what the next finer one is on it */
 typedef struct pal_grid_level {
     int n_cell, n_node;

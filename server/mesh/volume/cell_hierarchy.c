@@ -30,6 +30,7 @@ typedef struct work {
     pal_lattice_cells from;
     entry *entry;    /* [n_cell] */
     int32_t *group;  /* coarse cell of each finer cell [n_cell] */
+    uint8_t *octant; /* place of each finer cell in its coarse cell [n_cell] */
     int32_t *corner; /* corners of coarse cells that nodes are interpolated from, by the parity of the node: bit of each
                         axis along which it lies between two; -1: none [n_node][8] */
     int32_t *root;   /* node of each corner of a coarse cell [n_coarse][8] */
@@ -74,8 +75,8 @@ static pal_err group_cells(work *w)
     return err;
 }
 
-/* Corner `corner` of the cell at `octant` of a coarse cell lies between corners of it: calls of visit(k) with the index
- * k among those and the corner d of the coarse cell */
+/* Corner `corner` of the cell at `octant` of a coarse cell lies between corners of it. k: bit of each axis along which
+ * it is between two, that of the far one. Returns corner k of the coarse cell; -1: there is none */
 static int coarse_corner(int octant, int corner, int k)
 {
     int d = 0;
@@ -88,14 +89,14 @@ static int coarse_corner(int octant, int corner, int k)
 }
 
 /* corners of coarse cells that one node of the finer level is interpolated from are one */
-static void join_corners(work *w, const uint8_t *octant)
+static void join_corners(work *w)
 {
     pal_union_find_init(w->root, 8 * w->n_coarse);
     for (int i = 0; i < 8 * w->from.n_node; i++) w->corner[i] = -1;
     for (int e = 0; e < w->from.n_cell; e++)
         for (int c = 0; c < 8; c++)
             for (int k = 0; k < 8; k++) {
-                const int d = coarse_corner(octant[e], c, k);
+                const int d = coarse_corner(w->octant[e], c, k);
                 if (d < 0) continue;
                 int32_t *seen = &w->corner[8 * (size_t)w->from.node[8 * (size_t)e + (size_t)c] + (size_t)k];
                 const int32_t here = 8 * w->group[e] + d;
@@ -106,13 +107,21 @@ static void join_corners(work *w, const uint8_t *octant)
             }
 }
 
+/* a level that is hardly coarser */
+static bool too_many(const work *w, const pal_grid_level *level)
+{
+    return level->n_node > PAL_LEVEL_SHRINKS * w->from.n_node;
+}
+
 /* children of each coarse cell */
 static pal_err list_children(const work *w, pal_arena *arena, pal_grid_level *out)
 {
     out->n_cell = w->n_coarse;
     out->child = PAL_NEW(arena, int32_t, w->from.n_cell);
     out->first = PAL_NEW(arena, int32_t, w->n_coarse + 2);
-    if (!out->child || !out->first) return PAL_ERR_MEMORY;
+    out->octant = PAL_NEW(arena, uint8_t, w->from.n_cell);
+    if (!out->child || !out->first || !out->octant) return PAL_ERR_MEMORY;
+    memcpy(out->octant, w->octant, (size_t)w->from.n_cell);
     for (int e = 0; e < w->from.n_cell; e++) out->first[w->group[e] + 2]++;
     for (int g = 0; g < w->n_coarse; g++) out->first[g + 2] += out->first[g + 1];
     for (int e = 0; e < w->from.n_cell; e++) out->child[out->first[w->group[e] + 1]++] = e;
@@ -137,7 +146,6 @@ static pal_err list_finer(int n_finer, pal_arena *arena, pal_grid_level *out)
 static pal_err fill_nodes(work *w, pal_arena *arena, pal_grid_level *out)
 {
     const int n = w->from.n_node;
-    out->n_node = pal_union_find_label(w->root, 8 * w->n_coarse);
     out->node = PAL_NEW(arena, int32_t, 8 * (size_t)w->n_coarse);
     out->fixed = PAL_NEW(arena, uint8_t, out->n_node);
     out->start = PAL_NEW(arena, int32_t, n + 1);
@@ -161,7 +169,7 @@ static pal_err fill_nodes(work *w, pal_arena *arena, pal_grid_level *out)
     return list_finer(n, arena, out);
 }
 
-/* place [n_coarse][3], heap, of the coarse cells */
+/* place [n_coarse][3], heap, of the coarse cells; out has no more than a number of nodes if they are too many */
 static pal_err coarsen(work *w, pal_arena *arena, pal_grid_level *out, int32_t **place)
 {
     const pal_lattice_cells *from = &w->from;
@@ -169,13 +177,12 @@ static pal_err coarsen(work *w, pal_arena *arena, pal_grid_level *out, int32_t *
     PAL_ARRAY(&err, w->entry, from->n_cell);
     PAL_ARRAY(&err, w->group, from->n_cell);
     PAL_ARRAY(&err, w->corner, 8 * (size_t)from->n_node);
+    PAL_ARRAY(&err, w->octant, from->n_cell);
     if (err) return err;
-    out->octant = PAL_NEW(arena, uint8_t, from->n_cell);
-    if (!out->octant) return PAL_ERR_MEMORY;
     for (int e = 0; e < from->n_cell; e++) {
         const int32_t *at = from->place + 3 * (size_t)e;
         w->entry[e] = (entry){.block = {at[0] / 2, at[1] / 2, at[2] / 2}, .cell = e};
-        out->octant[e] = (uint8_t)((at[0] & 1) + 2 * (at[1] & 1) + 4 * (at[2] & 1));
+        w->octant[e] = (uint8_t)((at[0] & 1) + 2 * (at[1] & 1) + 4 * (at[2] & 1));
     }
     qsort(w->entry, (size_t)from->n_cell, sizeof *w->entry, compare_entries);
     PAL_TRY(group_cells(w));
@@ -184,7 +191,9 @@ static pal_err coarsen(work *w, pal_arena *arena, pal_grid_level *out, int32_t *
     if (err) return err;
     for (int e = 0; e < from->n_cell; e++)
         memcpy(*place + 3 * (size_t)w->group[w->entry[e].cell], w->entry[e].block, sizeof w->entry[e].block);
-    join_corners(w, out->octant);
+    join_corners(w);
+    out->n_node = pal_union_find_label(w->root, 8 * w->n_coarse);
+    if (too_many(w, out)) return PAL_ERR_OK;
     PAL_TRY(list_children(w, arena, out));
     return fill_nodes(w, arena, out);
 }
@@ -201,9 +210,9 @@ pal_err pal_cell_hierarchy_make(const pal_lattice_cells *cells, int n_coarsest, 
         int32_t *coarse = NULL;
         w.n_coarse = 0;
         err = coarsen(&w, arena, level, &coarse);
-        free(w.entry), free(w.group), free(w.corner), free(w.root), free(place);
+        free(w.entry), free(w.group), free(w.octant), free(w.corner), free(w.root), free(place);
         place = coarse;
-        if (err || level->n_node > PAL_LEVEL_SHRINKS * w.from.n_node) break;
+        if (err || too_many(&w, level)) break;
         w = (work){.from = {level->n_cell, level->n_node, level->node, place, level->fixed}};
         out->n_level++;
     }

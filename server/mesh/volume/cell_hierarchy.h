@@ -21,9 +21,8 @@ typedef struct pal_lattice_cells {
 /* of a finer level's nodes: a level with more of them costs nearly as much as that one and corrects little
  * (tests/mesh/volume/test_cell_hierarchy.c) */
 #define PAL_LEVEL_SHRINKS 0.8
-/* Levels until one has at most n_coarsest nodes, or the next would have more than PAL_LEVEL_SHRINKS of its nodes;
- * MEMORY
- */
+/* Levels until one has at most n_coarsest nodes, or the next would have more than PAL_LEVEL_SHRINKS of its nodes: that
+ * one takes no memory of the arena. MEMORY */
 pal_err pal_cell_hierarchy_make(const pal_lattice_cells *cells, int n_coarsest, pal_arena *arena,
                                 pal_grid_hierarchy *out);
 #endif

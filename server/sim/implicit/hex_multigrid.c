@@ -298,7 +298,14 @@ static pal_err fill_levels(const pal_hex_levels *levels, const float *rotation, 
     return pal_multigrid_finish(to->coarse);
 }
 
-/* masses and D of the finest level */
+/* masses of the finest level, which an edit may change while a spare thread makes the rest */
+static void fill_weights(const pal_hex_levels *levels, pal_hex_values *to)
+{
+    const pal_body *body = levels->body;
+    for (int i = 0; i < body->n_node; i++) to->weight[body->node_order->slot[i]] = (float)(to->mass * body->mass_kg[i]);
+}
+
+/* D of the finest level */
 static void fill_diagonal(const pal_hex_levels *levels, pal_hex_values *to)
 {
     const pal_body *body = levels->body;
@@ -312,48 +319,51 @@ static void fill_diagonal(const pal_hex_levels *levels, pal_hex_values *to)
             to->inverse[slot[hexes->node[8 * e + c / 3]]] += (float)((k[c][c] + k[c + 1][c + 1] + k[c + 2][c + 2]) / 3);
     }
     for (int i = 0; i < body->n_node; i++) {
-        float *inverse = &to->inverse[slot[i]], weight = (float)(to->mass * body->mass_kg[i]);
-        to->weight[slot[i]] = weight;
+        float *inverse = &to->inverse[slot[i]];
+        const float weight = to->weight[slot[i]];
         *inverse = !body->support[i] && *inverse + weight > 0 ? 1 / (*inverse + weight) : 0;
     }
 }
 
 /* the norm sqrt(d' D d), in which D^-1 A is symmetric */
-static double size_of(const pal_hex_multigrid *mg, const float *d)
+static double size_of(void *self)
 {
+    const pal_hex_multigrid *mg = self;
     const int32_t *slot = mg->levels->body->node_order->slot;
     double sum = 0;
     for (int i = 0; i < mg->levels->body->n_node; i++)
         for (int c = 0; c < 3; c++) {
-            const size_t at = (size_t)slot[i] + (size_t)c * (size_t)mg->levels->n_slot;
+            const float d = mg->levels->d[(size_t)slot[i] + (size_t)c * (size_t)mg->levels->n_slot];
             const float inverse = mg->now.inverse[slot[i]];
-            if (inverse > 0) sum += (double)(d[at] * d[at] / inverse);
+            if (inverse > 0) sum += (double)(d * d / inverse);
         }
     return sqrt(sum);
 }
 
-/* largest eigenvalue of D^-1 A by power iteration from a vector that is not smooth */
+/* d = scale D^-1 A d */
+static void apply(void *self, float scale)
+{
+    const pal_hex_multigrid *mg = self;
+    const size_t n = (size_t)mg->levels->n_slot;
+    float *d = mg->levels->d, *q = mg->levels->q;
+    for (int g = 0; g < mg->levels->n_group; g++)
+        for (size_t at = (size_t)mg->levels->group[g], i = at; i < 3 * n; i += n)
+            store(q + i, load(mg->now.weight + at) * load(d + i));
+    multiply(mg, d);
+    for (int g = 0; g < mg->levels->n_group; g++)
+        for (size_t at = (size_t)mg->levels->group[g], i = at; i < 3 * n; i += n)
+            store(d + i, load(q + i) * load(mg->now.inverse + at) * scale);
+}
+
 static void find_lambda(pal_hex_multigrid *mg)
 {
     const int32_t *slot = mg->levels->body->node_order->slot;
     const size_t n = (size_t)mg->levels->n_slot;
-    float *d = mg->levels->d, *q = mg->levels->q;
-    memset(d, 0, 3 * sizeof *d * n);
+    memset(mg->levels->d, 0, 3 * sizeof *mg->levels->d * n);
     for (int i = 0; i < mg->levels->body->n_node; i++)
         for (size_t c = 0; c < 3 && mg->now.inverse[slot[i]] > 0; c++)
-            d[(size_t)slot[i] + c * n] = (float)((7 * i + 3 * (int)c) % 11 - 5);
-    double lambda = 1, size = size_of(mg, d);
-    for (int k = 0; k < PAL_POWER_ITERATIONS && size > 0 && isfinite(size); k++) {
-        for (int g = 0; g < mg->levels->n_group; g++)
-            for (size_t at = (size_t)mg->levels->group[g], i = at; i < 3 * n; i += n)
-                store(q + i, load(mg->now.weight + at) * load(d + i));
-        multiply(mg, d);
-        for (int g = 0; g < mg->levels->n_group; g++)
-            for (size_t at = (size_t)mg->levels->group[g], i = at; i < 3 * n; i += n)
-                store(d + i, load(q + i) * load(mg->now.inverse + at) * (float)(1 / size));
-        lambda = size = size_of(mg, d);
-    }
-    mg->now.lambda = (float)(PAL_CHEBYSHEV_SAFE * lambda);
+            mg->levels->d[(size_t)slot[i] + c * n] = pal_chebyshev_start(i, (int)c);
+    mg->now.lambda = pal_chebyshev_lambda(size_of, apply, mg);
 }
 
 void pal_hex_multigrid_rotate(pal_hex_multigrid *mg)
@@ -367,6 +377,7 @@ pal_err pal_hex_multigrid_update(pal_hex_multigrid *mg, double mass, double stif
     mg->now.mass = mass, mg->now.stiff = stiff;
     pal_hex_single_stiffen(&mg->levels->single);
     pal_hex_single_rotate(&mg->levels->single);
+    fill_weights(mg->levels, &mg->now);
     fill_diagonal(mg->levels, &mg->now);
     find_lambda(mg);
     return fill_levels(mg->levels, mg->levels->single.rotation, &mg->now);
@@ -386,6 +397,7 @@ pal_err pal_hex_multigrid_refresh(pal_hex_multigrid *mg, double mass, double sti
 {
     const pal_elastic_hexes *cubes = mg->levels->cubes;
     mg->next.mass = mass, mg->next.stiff = stiff;
+    fill_weights(mg->levels, &mg->next);
     for (int i = 0; i < 9 * PAL_LANES * cubes->n_block && mg->turned; i++) mg->turned[i] = (float)cubes->rotation[i];
     return pal_spare_thread_run(&mg->spare_thread, make_next, mg);
 }

@@ -46,8 +46,8 @@ pal_err pal_hex_levels_make(const pal_body *body, const pal_elastic_hexes *cubes
                             pal_hex_levels *out);
 pal_err pal_hex_multigrid_make(pal_hex_levels *levels, pal_arena *arena, pal_hex_multigrid *out);
 void pal_hex_multigrid_destroy(pal_hex_multigrid *mg);
-/* takes material and rotations of the last linearise. NUMERIC: not positive definite; MEMORY; no solve may follow then
- */
+/* takes material and rotations of the last linearise. NUMERIC: not positive definite; MEMORY. No solve may follow an
+ * error */
 pal_err pal_hex_multigrid_update(pal_hex_multigrid *mg, double mass, double stiff);
 /* starts levels of the rotations of the last linearise on a spare thread. MEMORY */
 pal_err pal_hex_multigrid_refresh(pal_hex_multigrid *mg, double mass, double stiff);

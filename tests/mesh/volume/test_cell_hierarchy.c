@@ -163,6 +163,7 @@ static void loose_cells_make_no_levels(void)
     const pal_lattice_cells cells = {N, 8 * N, node, place, fixed};
     REQUIRE(arena && !pal_cell_hierarchy_make(&cells, 100, arena, &grid));
     CHECK_INT(grid.n_level, 0);
+    CHECK(pal_arena_used(arena) == 0);
     /* every cell hangs together with the next one by a node: one group, which is one coarse cell */
     for (int i = 1; i < N; i++) node[8 * i] = node[8 * i - 1];
     REQUIRE(!pal_cell_hierarchy_make(&cells, 100, arena, &grid));

@@ -1,8 +1,10 @@
 /* Preconditioners of implicit solvers: iterations of multigrid at growing size, bending, contrast, near
- * incompressibility and with bad cells; that it changes no answer; that one application is symmetric and positive; what
- * is chosen, and what is refused. Bounds on iterations are those measured, plus a quarter (tests/bench/README.md). */
+ * incompressibility, with bad cells and of an irregular body; that it changes no answer; that one application is
+ * symmetric and positive; what is chosen, and what is refused. Bounds on iterations are those measured, plus a quarter
+ * (tests/bench/README.md). */
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/organ_family.h"
+#include "server/mesh/geometry/procedural.h"
 #include "server/sim/elements/elastic_hex.h"
 #include "server/sim/implicit/preconditioner.h"
 #include "tests/fixtures/fem_beam.h"
@@ -15,6 +17,48 @@ static pal_solve_report report_of(const fem_beam *b)
     pal_solve_report report;
     CHECK(pal_world_solve_report(b->world, 0, &report));
     return report;
+}
+
+/* an ellipsoid of cells that its surface cuts, in the scene of the reference beam; held at one end.
+ * beam_free frees all but the skin */
+static void ellipsoid_make(fem_beam *b)
+{
+    static const double axis_m[3] = {0.1, 0.07, 0.06};
+    pal_surface surface;
+    pal_prepare_report report;
+    const pal_voxel_options options = {.resolution = 32, .border = true, .fill = true};
+    memset(b, 0, sizeof *b);
+    REQUIRE(!pal_sphere_make(1, &surface));
+    for (int i = 0; i < 3 * surface.n_vertex; i++) surface.x[i] *= axis_m[i % 3];
+    REQUIRE(!pal_prepared_make(&surface, &options, &b->mesh, &report, &diag));
+    pal_surface_free(&surface);
+    b->scene = box_scene(&b->mesh, true, false);
+    b->def = &b->scene->body[0];
+    pal_entry_init(&b->def->model, "model", "fem");
+    pal_entry_init(&b->def->solver, "solver", "implicit_euler");
+    b->def->n_effect = 0;
+    b->def->material = (pal_material){.young_Pa = 1e5, .poisson = 0.45, .density_kg_m3 = 1000};
+    b->def->support[0] = (pal_support_def){.low_m = {-1, -1, -1}, .high_m = {-0.08, 1, 1}};
+}
+
+/* loads the nodes at its other end along z, 3 N in all */
+static void ellipsoid_load(fem_beam *b)
+{
+    int n = 0;
+    for (int turn = 0; turn < 2; turn++)
+        for (int i = 0; i < b->body->n_node; i++) {
+            if (b->body->x_rest[3 * i] < 0.08) continue;
+            if (turn == 0)
+                n++;
+            else
+                pal_world_load(b->world, 0, i, (double[3]){0, 0, 3.0 / n});
+        }
+}
+
+static void ellipsoid_free(fem_beam *b)
+{
+    pal_skin_free(&b->mesh.skin);
+    beam_free(b);
 }
 
 /* iterations of a static solve of the reference beam with n voxels across, linear, to 1e-6 */
@@ -159,6 +203,23 @@ static void hard_cases_converge(void)
     }
 }
 
+static void an_irregular_body_needs_few_iterations(void)
+{
+    fem_beam b;
+    ellipsoid_make(&b);
+    beam_element(&b, "hex8_bbar", "linear");
+    beam_solver(&b, "static_newton");
+    pal_entry_put_text(&b.def->solver, "linear", "multigrid", NULL);
+    beam_key(&b, "tolerance", 1e-6);
+    REQUIRE(!beam_open(&b, &diag));
+    ellipsoid_load(&b);
+    REQUIRE(!pal_world_step(b.world, 1.0 / 60));
+    CHECK(report_of(&b).converged);
+    printf("  %d nodes: %d iterations to 1e-6\n", b.body->n_node, report_of(&b).n_cg);
+    CHECK_LE(report_of(&b).n_cg, 14);
+    ellipsoid_free(&b);
+}
+
 /* live, bent by nearly half its length and let go: iterations of the factor and of multigrid */
 static void a_bent_beam_needs_few_iterations(void)
 {
@@ -216,6 +277,28 @@ static void fresh_levels_save_iterations(void)
     CHECK_LE(mean[1], 0.8 * mean[0]);
     CHECK_NEAR(end[1], end[2], 0);
     CHECK_NEAR(mean[1], mean[2], 0);
+}
+
+/* edits of the material while levels are made on the spare thread: these are dropped, and every edit makes its own */
+static void an_edit_drops_levels_in_the_making(void)
+{
+    fem_beam b;
+    beam_reference(&b, 6);
+    beam_element(&b, "hex8_bbar", "corotational");
+    pal_entry_put_text(&b.def->solver, "preconditioner", "multigrid", NULL);
+    beam_key(&b, "refresh_iterations", 1);
+    beam_key(&b, "tolerance", 1e-4);
+    REQUIRE(!beam_open(&b, &diag));
+    beam_load_end(&b, 800);
+    pal_material material = b.def->material;
+    for (int k = 0; k < 6; k++) {
+        REQUIRE(!pal_world_step(b.world, 1.0 / 60)); /* its end begins a refresh */
+        CHECK_LE(2, report_of(&b).n_cg);
+        material.density_kg_m3 = k % 2 ? 1000 : 1500;
+        REQUIRE(!pal_world_material(b.world, 0, &material, &diag));
+        CHECK_INT(report_of(&b).n_factor, k + 2);
+    }
+    beam_free(&b);
 }
 
 /* A body with two coarse levels that smooth before the factored one. k: 0 the reference beam, 1 an organ with cut
@@ -443,8 +526,10 @@ int main(void)
     RUN(the_neo_hookean_law_converges_where_it_is_strained);
     RUN(a_free_body_is_relieved_as_with_a_factor);
     RUN(hard_cases_converge);
+    RUN(an_irregular_body_needs_few_iterations);
     RUN(a_bent_beam_needs_few_iterations);
     RUN(fresh_levels_save_iterations);
+    RUN(an_edit_drops_levels_in_the_making);
     RUN(threads_do_not_change_a_bit);
     RUN(parts_of_a_round_share_no_slot);
     RUN(an_application_is_symmetric_and_positive);

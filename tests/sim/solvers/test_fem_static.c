@@ -386,6 +386,34 @@ static void compliance_is_that_of_the_bent_body(void)
         }
 }
 
+/* one call for the same force, at load and after the body was bent and reset */
+static void a_reset_forgets_compliances(void)
+{
+    fem_beam b;
+    beam_reference(&b, 4);
+    beam_element(&b, "hex8_bbar", "corotational");
+    beam_solver(&b, "static_newton");
+    pal_entry_init(&b.def->effect[b.def->n_effect++], "effects[0]", "tool_push");
+    pal_tools_default(b.scene, 1);
+    b.scene->tool[0].radius_m = 0.01;
+    REQUIRE(!beam_open(&b, &diag));
+    REQUIRE(b.body->compliance != NULL);
+    const int n3 = 3 * b.body->n_node, node = box_node((const int[3]){16, 4, 4}, 16, 2, 4);
+    double *f = calloc(3 * (size_t)n3, sizeof *f), *first = f + n3, *u = first + n3;
+    REQUIRE(f != NULL);
+    f[3 * node + 2] = 1e-3;
+    CHECK(b.body->compliance->solve(b.body->compliance->self, b.body, f, first));
+    beam_load_end(&b, 800);
+    REQUIRE(!rest(&b));
+    CHECK(b.body->compliance->solve(b.body->compliance->self, b.body, f, u));
+    CHECK(fabs(u[3 * node + 2] - first[3 * node + 2]) > 1e-2 * fabs(first[3 * node + 2]));
+    pal_world_reset(b.world);
+    CHECK(b.body->compliance->solve(b.body->compliance->self, b.body, f, u));
+    CHECK(memcmp(u, first, sizeof *u * (size_t)n3) == 0);
+    free(f);
+    beam_free(&b);
+}
+
 int main(void)
 {
     RUN(a_slender_beam_bends_as_timoshenko_says);
@@ -400,5 +428,6 @@ int main(void)
     RUN(rests_under_next_to_no_load);
     RUN(starts_again_after_a_reset);
     RUN(compliance_is_that_of_the_bent_body);
+    RUN(a_reset_forgets_compliances);
     return check_report();
 }
