@@ -166,12 +166,12 @@ static void smooth(const pal_hex_multigrid *mg, bool from_zero)
     }
 }
 
-static void turn(const double *w, const float *v, bool back, float *to)
+static void turn(const float *w, const float *v, bool back, float *to)
 {
     for (int i = 0; i < 3; i++) {
-        const double *a = back ? w + i : w + 3 * i;
+        const float *a = back ? w + i : w + 3 * i;
         const int step = back ? 3 : 1;
-        to[i] = (float)a[0] * v[0] + (float)a[step] * v[1] + (float)a[2 * step] * v[2];
+        to[i] = a[0] * v[0] + a[step] * v[1] + a[2 * step] * v[2];
     }
 }
 

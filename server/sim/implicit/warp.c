@@ -52,7 +52,8 @@ pal_err pal_warp_make(const pal_node_rotations *rotations, pal_arena *arena, pal
 {
     size_t n = (size_t)rotations->n_dof;
     *out = (pal_warp){.n_dof = rotations->n_dof};
-    if (!PAL_NEW_DOUBLES(arena, 4 * n, &out->base) || !PAL_NEW_DOUBLES(arena, 9 * n, &out->w)) return PAL_ERR_MEMORY;
+    out->w = PAL_NEW(arena, float, 9 * n);
+    if (!PAL_NEW_DOUBLES(arena, 4 * n, &out->base) || !out->w) return PAL_ERR_MEMORY;
     pal_warp_rest(out->base, out->n_dof);
     return PAL_ERR_OK;
 }
@@ -67,20 +68,27 @@ void pal_warp_rotate(pal_warp *warp, const pal_node_rotations *rotations)
                              -a[0] * b[1] + a[1] * b[0] - a[2] * b[3] + a[3] * b[2],
                              -a[0] * b[2] + a[1] * b[3] + a[2] * b[0] - a[3] * b[1],
                              -a[0] * b[3] - a[1] * b[2] + a[2] * b[1] + a[3] * b[0]};
-        pal_quat_matrix(q, warp->w + 9 * i);
+        double w[9];
+        pal_quat_matrix(q, w);
+        for (int k = 0; k < 9; k++) warp->w[9 * i + k] = (float)w[k];
     }
+}
+
+/* to = W v, or W' v; to may be v */
+static void turn(const float w[9], const double v[3], bool back, double to[3])
+{
+    double r[9];
+    for (int k = 0; k < 9; k++) r[k] = (double)(back ? w[k % 3 * 3 + k / 3] : w[k]);
+    const double x = v[0], y = v[1], z = v[2];
+    for (int c = 0; c < 3; c++) to[c] = r[3 * c] * x + r[3 * c + 1] * y + r[3 * c + 2] * z;
 }
 
 void pal_warp_back(const pal_warp *warp, const double *r, double *out)
 {
-    for (int i = 0; i < warp->n_dof; i++) pal_tmul33(out + 3 * i, warp->w + 9 * i, r + 3 * i);
+    for (int i = 0; i < warp->n_dof; i++) turn(warp->w + 9 * i, r + 3 * i, true, out + 3 * i);
 }
 
 void pal_warp_forth(const pal_warp *warp, double *z)
 {
-    for (int i = 0; i < warp->n_dof; i++) {
-        double turned[3];
-        pal_mul33(turned, warp->w + 9 * i, z + 3 * i);
-        memcpy(z + 3 * i, turned, sizeof turned);
-    }
+    for (int i = 0; i < warp->n_dof; i++) turn(warp->w + 9 * i, z + 3 * i, false, z + 3 * i);
 }

@@ -21,7 +21,7 @@ typedef struct pal_warp {
     int n_dof;
     bool rotated; /* false: w is 1 everywhere */
     double *base; /* quat at the reference state [n_dof][4] */
-    double *w;    /* rotations since            [n_dof][9] */
+    float *w;     /* rotations since; single precision is enough for a preconditioner [n_dof][9] */
 } pal_warp;
 
 /* the reference state is rest; MEMORY. [load] */
