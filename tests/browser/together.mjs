@@ -90,7 +90,8 @@ await run(async () => {
             `${(1000 * max[i]).toFixed(2)} mm`,
         );
     }
-    check("the bridge renders forces", force > 0.05, `${force} N`);
+    // it says so above 0.05 N, and reports hundredths
+    check("the bridge renders forces", force >= 0.05, `${force} N`);
     check("the forces of the bridge stay below their limit", force <= 3.0001, `${force} N`);
     logger.kill("SIGINT");
     await logger.ended;
