@@ -1,5 +1,6 @@
-/* Workers take the next piece from an atomic counter. A run is open from its call until the caller finds no more
- * pieces; a worker that wakes later does not enter it, so nobody waits for a thread that has no work. */
+/* Workers take pieces from an atomic counter that names its run as well, without a lock: a worker that comes late, to a
+ * run without pieces or to the next one, sees by the name what it has got. A run ends when all its pieces are done, so
+ * nobody waits for a thread that has none. The lock is for sleep alone. */
 #include "server/base/team.h"
 
 #include "server/base/subnormals.h"
@@ -24,16 +25,17 @@ typedef struct worker {
 
 struct pal_team {
     pthread_mutex_t lock;
-    pthread_cond_t begun, left; /* workers wait for begun, the caller for left            */
-    bool open, quit;
-    _Atomic bool held;     /* workers watch for the next run instead of sleeping */
-    _Atomic int n_inside;  /* workers at work on this run, without the caller        */
-    _Atomic uint64_t run;  /* number of the run: a worker enters a run once */
-    _Atomic int64_t next;  /* next piece; each worker increments it once past n */
-    unsigned mode;         /* of the caller's numbers, which workers take over  */
-    int n, size, n_thread; /* size = n_thread + 1                                    */
+    pthread_cond_t begun, left; /* sleeping workers wait for begun, the sleeping caller for left */
+    bool quit;                  /* under the lock */
+    _Atomic bool held;          /* workers watch for the next run instead of sleeping, and the caller for its end */
+    _Atomic uint64_t next;      /* run << 32, plus its next piece; each worker counts once past the last */
+    _Atomic uint64_t span;      /* run << 32, plus the number of its pieces: written before `next` */
+    _Atomic int n_done;         /* pieces of this run */
+    /* of a run, for who has got a piece of it */
+    unsigned mode; /* of the caller's numbers, which workers take over */
     void (*piece)(void *user, int worker, int index);
     void *user;
+    int size, n_thread; /* size = n_thread + 1 */
     worker worker[];
 };
 
@@ -55,12 +57,24 @@ static int count_cores(void)
     return n < 1 ? 1 : n > PAL_TEAM_MAX ? PAL_TEAM_MAX : (int)n;
 }
 
-static void work(pal_team *team, int number)
+/* does pieces until there are none; returns the run that had none left */
+static uint64_t work(pal_team *team, int number)
 {
-    for (;;) {
-        int64_t i = atomic_fetch_add_explicit(&team->next, 1, memory_order_relaxed);
-        if (i >= team->n) return;
-        team->piece(team->user, number, (int)i);
+    for (int n_done = 0;;) {
+        const uint64_t got = atomic_fetch_add(&team->next, 1), span = atomic_load(&team->span);
+        if (got >> 32 != span >> 32 || (uint32_t)got >= (uint32_t)span) {
+            /* who does the last one wakes a caller that sleeps; it may be gone, or have begun the next run, by then */
+            if (n_done > 0 && atomic_fetch_add(&team->n_done, n_done) + n_done == (int)(uint32_t)span &&
+                !atomic_load(&team->held)) {
+                pthread_mutex_lock(&team->lock);
+                pthread_cond_signal(&team->left);
+                pthread_mutex_unlock(&team->lock);
+            }
+            return got >> 32;
+        }
+        if (number > 0 && n_done == 0) pal_subnormals_restore(team->mode);
+        team->piece(team->user, number, (int)(uint32_t)got);
+        n_done++;
     }
 }
 
@@ -71,43 +85,31 @@ static inline void pause_core(void)
 #endif
 }
 
-/* watches the team, outside the lock, which it leaves and takes again, while it is held and `run` is its last run */
-static void watch(pal_team *team, uint64_t run)
+static bool is_last(pal_team *team, uint64_t run)
 {
-    pthread_mutex_unlock(&team->lock);
-    for (int k = 1; atomic_load(&team->held) && atomic_load(&team->run) == run; k++) {
+    return atomic_load(&team->next) >> 32 == run;
+}
+
+/* watches or sleeps while `seen` is the last run; false: the team ends */
+static bool wait_for_run(pal_team *team, uint64_t seen)
+{
+    for (int k = 1; atomic_load(&team->held) && is_last(team, seen); k++) {
         pause_core();
         if (k % WATCHES == 0) sched_yield();
     }
+    if (!is_last(team, seen)) return true;
     pthread_mutex_lock(&team->lock);
+    while (!team->quit && !atomic_load(&team->held) && is_last(team, seen))
+        pthread_cond_wait(&team->begun, &team->lock);
+    const bool quit = team->quit;
+    pthread_mutex_unlock(&team->lock);
+    return !quit;
 }
 
 static void *live(void *self)
 {
     worker *w = self;
-    pal_team *team = w->team;
-    uint64_t seen = 0;
-    pthread_mutex_lock(&team->lock);
-    for (;;) {
-        while (!team->quit && !(team->open && team->run != seen)) {
-            if (!team->held) {
-                pthread_cond_wait(&team->begun, &team->lock);
-                continue;
-            }
-            seen = team->run; /* a run that ended before it was seen */
-            watch(team, seen);
-        }
-        if (team->quit) break;
-        seen = team->run;
-        team->n_inside++;
-        const unsigned mode = team->mode;
-        pthread_mutex_unlock(&team->lock);
-        pal_subnormals_restore(mode);
-        work(team, w->number);
-        pthread_mutex_lock(&team->lock);
-        if (--team->n_inside == 0) pthread_cond_signal(&team->left);
-    }
-    pthread_mutex_unlock(&team->lock);
+    for (uint64_t seen = 0; wait_for_run(w->team, seen);) seen = work(w->team, w->number);
     return NULL;
 }
 
@@ -154,40 +156,37 @@ int pal_team_size(const pal_team *team)
     return team->size;
 }
 
+static void wake_workers(pal_team *team, int n)
+{
+    pthread_mutex_lock(&team->lock);
+    if (n >= team->n_thread)
+        pthread_cond_broadcast(&team->begun);
+    else
+        for (int i = 0; i < n; i++) pthread_cond_signal(&team->begun);
+    pthread_mutex_unlock(&team->lock);
+}
+
 void pal_team_run(pal_team *team, int n, void (*piece)(void *user, int worker, int index), void *user)
 {
     if (n <= 1 || !team || team->n_thread == 0) {
         for (int i = 0; i < n; i++) piece(user, 0, i);
         return;
     }
-    pthread_mutex_lock(&team->lock);
-    team->piece = piece;
-    team->user = user;
-    team->n = n;
-    team->mode = pal_subnormals_mode();
-    atomic_store_explicit(&team->next, 0, memory_order_relaxed);
-    team->run++;
-    team->open = true;
-    if (n > team->n_thread)
-        pthread_cond_broadcast(&team->begun);
-    else
-        for (int i = 0; i < n - 1; i++) pthread_cond_signal(&team->begun);
-    pthread_mutex_unlock(&team->lock);
-    work(team, 0);
-    pthread_mutex_lock(&team->lock);
-    team->open = false;
-    while (team->n_inside > 0) {
-        if (!team->held) {
-            pthread_cond_wait(&team->left, &team->lock);
-            continue;
-        }
-        pthread_mutex_unlock(&team->lock);
-        for (int k = 1; atomic_load(&team->n_inside) > 0; k++) {
-            pause_core();
-            if (k % WATCHES == 0) sched_yield();
-        }
-        pthread_mutex_lock(&team->lock);
+    const uint64_t run = (uint64_t)(uint32_t)((atomic_load(&team->next) >> 32) + 1) << 32;
+    team->piece = piece, team->user = user, team->mode = pal_subnormals_mode();
+    atomic_store(&team->n_done, 0);
+    atomic_store(&team->span, run | (uint32_t)n);
+    atomic_store(&team->next, run);
+    const bool held = atomic_load(&team->held);
+    if (!held) wake_workers(team, n - 1);
+    (void)work(team, 0);
+    for (int k = 1; held && atomic_load(&team->n_done) < n; k++) {
+        pause_core();
+        if (k % WATCHES == 0) sched_yield();
     }
+    if (held) return;
+    pthread_mutex_lock(&team->lock);
+    while (atomic_load(&team->n_done) < n) pthread_cond_wait(&team->left, &team->lock);
     pthread_mutex_unlock(&team->lock);
 }
 
@@ -195,7 +194,7 @@ void pal_team_hold(pal_team *team)
 {
     if (!team || team->n_thread == 0) return;
     pthread_mutex_lock(&team->lock);
-    team->held = true;
+    atomic_store(&team->held, true);
     pthread_cond_broadcast(&team->begun);
     pthread_mutex_unlock(&team->lock);
 }

@@ -18,8 +18,8 @@ pal_err pal_hex_single_make(const pal_elastic_hexes *cubes, const pal_body *body
                             pal_elastic_hexes_single *out);
 /* takes the present material */
 void pal_hex_single_stiffen(pal_elastic_hexes_single *single);
-/* takes the rotations of the last linearise */
-void pal_hex_single_rotate(pal_elastic_hexes_single *single);
+/* takes the rotations of the last linearise. team: NULL, or threads that share the work */
+void pal_hex_single_rotate(pal_elastic_hexes_single *single, pal_team *team);
 /* out += k K p; empty slots of p are 0. team: NULL, or threads that share the work; the same bits with any number */
 void pal_hex_single_multiply(const pal_elastic_hexes_single *single, pal_team *team, float k, const float *p,
                              float *out);

@@ -368,7 +368,7 @@ static void find_lambda(pal_hex_multigrid *mg)
 
 void pal_hex_multigrid_rotate(pal_hex_multigrid *mg)
 {
-    pal_hex_single_rotate(&mg->levels->single);
+    pal_hex_single_rotate(&mg->levels->single, mg->levels->body->team);
 }
 
 pal_err pal_hex_multigrid_update(pal_hex_multigrid *mg, double mass, double stiff)
@@ -376,7 +376,7 @@ pal_err pal_hex_multigrid_update(pal_hex_multigrid *mg, double mass, double stif
     pal_spare_thread_wait(&mg->spare_thread);
     mg->now.mass = mass, mg->now.stiff = stiff;
     pal_hex_single_stiffen(&mg->levels->single);
-    pal_hex_single_rotate(&mg->levels->single);
+    pal_hex_single_rotate(&mg->levels->single, mg->levels->body->team);
     fill_weights(mg->levels, &mg->now);
     fill_diagonal(mg->levels, &mg->now);
     find_lambda(mg);

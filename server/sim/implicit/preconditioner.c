@@ -205,7 +205,7 @@ void pal_preconditioner_set_rest(pal_preconditioner *p)
 void pal_preconditioner_rotate(pal_preconditioner *p)
 {
     if (p->kind == PAL_PRECONDITION_INCOMPLETE) return;
-    pal_warp_rotate(&p->warp, p->rotations);
+    pal_warp_rotate(&p->warp, p->rotations, p->system->body->team);
     if (p->kind == PAL_PRECONDITION_MULTIGRID && !p->shares) pal_hex_multigrid_rotate(&p->multigrid);
 }
 

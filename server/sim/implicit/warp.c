@@ -1,11 +1,15 @@
 /* Rotations of dofs. */
 #include "server/sim/implicit/warp.h"
 
+#include "server/base/team.h"
 #include "server/base/vec3.h"
 #include "server/sim/core/simd_wide.h"
 
 #include <float.h>
 #include <string.h>
+
+/* dofs of a piece of work of a thread, a multiple of PAL_WIDE: some ten microseconds */
+enum { DOFS = 512 };
 
 void pal_warp_rest(double *quat, int n_dof)
 {
@@ -28,24 +32,33 @@ void pal_node_rotations_reset(pal_node_rotations *rotations)
     pal_warp_rest(rotations->quat, rotations->n_dof);
 }
 
-void pal_node_rotations_update(pal_node_rotations *rotations, const pal_system *system)
+/* a piece of the dofs */
+static void rotate_dofs(void *user, int worker, int index)
 {
-    if (!rotations->any) return;
-    pal_system_rotate(system, rotations->sum);
-    for (int first = 0; first < rotations->n_dof; first += PAL_WIDE) {
+    const pal_node_rotations *rotations = user;
+    const int begin = index * DOFS, end = begin + DOFS < rotations->n_dof ? begin + DOFS : rotations->n_dof;
+    (void)worker;
+    for (int first = begin; first < end; first += PAL_WIDE) {
         pal_wide f[9], q[4], r[9], m[9];
         pal_wide_mask live;
         for (int l = 0; l < PAL_WIDE; l++) {
-            const int i = first + l < rotations->n_dof ? first + l : first;
+            const int i = first + l < end ? first + l : first;
             double size = 0;
             for (int k = 0; k < 9; k++) f[k][l] = rotations->sum[9 * i + k], size += fabs(f[k][l]);
             for (int k = 0; k < 4; k++) q[k][l] = rotations->quat[4 * i + k];
             live[l] = size > DBL_MIN && size < DBL_MAX ? -1 : 0; /* nodes that no element turns stay */
         }
         pal_wide_polar(f, live, q, r, m);
-        for (int l = 0; l < PAL_WIDE && first + l < rotations->n_dof; l++)
+        for (int l = 0; l < PAL_WIDE && first + l < end; l++)
             for (int k = 0; k < 4 && live[l]; k++) rotations->quat[4 * (first + l) + k] = q[k][l];
     }
+}
+
+void pal_node_rotations_update(pal_node_rotations *rotations, const pal_system *system)
+{
+    if (!rotations->any) return;
+    pal_system_rotate(system, rotations->sum);
+    pal_team_run(system->body->team, (rotations->n_dof + DOFS - 1) / DOFS, rotate_dofs, rotations);
 }
 
 pal_err pal_warp_make(const pal_node_rotations *rotations, pal_arena *arena, pal_warp *out)
@@ -58,12 +71,20 @@ pal_err pal_warp_make(const pal_node_rotations *rotations, pal_arena *arena, pal
     return PAL_ERR_OK;
 }
 
-void pal_warp_rotate(pal_warp *warp, const pal_node_rotations *rotations)
+typedef struct warp_pass {
+    pal_warp *warp;
+    const pal_node_rotations *rotations;
+} warp_pass;
+
+static void warp_dofs(void *user, int worker, int index)
 {
-    warp->rotated = rotations->any;
-    for (int i = 0; i < warp->n_dof && rotations->any; i++) {
+    const warp_pass *pass = user;
+    pal_warp *warp = pass->warp;
+    const int first = index * DOFS, end = first + DOFS < warp->n_dof ? first + DOFS : warp->n_dof;
+    (void)worker;
+    for (int i = first; i < end; i++) {
         /* quat times the conjugate of base */
-        const double *a = rotations->quat + 4 * i, *b = warp->base + 4 * i;
+        const double *a = pass->rotations->quat + 4 * i, *b = warp->base + 4 * i;
         const double q[4] = {a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3],
                              -a[0] * b[1] + a[1] * b[0] - a[2] * b[3] + a[3] * b[2],
                              -a[0] * b[2] + a[1] * b[3] + a[2] * b[0] - a[3] * b[1],
@@ -72,6 +93,12 @@ void pal_warp_rotate(pal_warp *warp, const pal_node_rotations *rotations)
         pal_quat_matrix(q, w);
         for (int k = 0; k < 9; k++) warp->w[9 * i + k] = (float)w[k];
     }
+}
+
+void pal_warp_rotate(pal_warp *warp, const pal_node_rotations *rotations, pal_team *team)
+{
+    warp->rotated = rotations->any;
+    if (rotations->any) pal_team_run(team, (warp->n_dof + DOFS - 1) / DOFS, warp_dofs, &(warp_pass){warp, rotations});
 }
 
 /* to = W v, or W' v; to may be v */

@@ -27,8 +27,8 @@ typedef struct pal_warp {
 /* the reference state is rest; MEMORY. [load] */
 pal_err pal_warp_make(const pal_node_rotations *rotations, pal_arena *arena, pal_warp *out);
 void pal_warp_rest(double *quat, int n_dof); /* quat [n_dof][4]: no rotation anywhere */
-/* sets w from the present rotations */
-void pal_warp_rotate(pal_warp *warp, const pal_node_rotations *rotations);
+/* sets w from the present rotations. team: NULL, or threads that share the work; the same bits with any number */
+void pal_warp_rotate(pal_warp *warp, const pal_node_rotations *rotations, pal_team *team);
 /* out = W' r; z = W z [n_dof][3] */
 void pal_warp_back(const pal_warp *warp, const double *r, double *out);
 void pal_warp_forth(const pal_warp *warp, double *z);
