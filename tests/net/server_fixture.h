@@ -77,13 +77,17 @@ static inline void served_turn(uint64_t ns, mem_client *a, mem_client *b)
     } while (0)
 
 /* For what another thread (a job, an estimator) does at its own pace: turns after each of its wakes, or after each step
- * of a session that runs. */
+ * of a session that runs. The time goes on by a frame, but not beyond the step that is due next, and never while one is
+ * made: a session is never late, however long the other thread takes. */
 #define WAIT_UNTIL(condition, a, b)                                                                                    \
     for (;;) {                                                                                                         \
-        uint64_t wakes = manual_clock_wakes(&served_clock);                                                            \
-        manual_clock_advance(&served_clock, FRAME_NS);                                                                 \
+        uint64_t wakes = manual_clock_wakes(&served_clock), events = manual_clock_events(&served_clock);               \
+        bool sleeps = manual_clock_advance_to_due(&served_clock, FRAME_NS);                                            \
         served_serve(a, b);                                                                                            \
         if (condition) break;                                                                                          \
-        manual_clock_wait_wake(&served_clock, wakes);                                                                  \
+        if (sleeps)                                                                                                    \
+            manual_clock_wait_wake(&served_clock, wakes);                                                              \
+        else                                                                                                           \
+            manual_clock_wait_event(&served_clock, events);                                                            \
     }
 #endif
