@@ -19,6 +19,14 @@ void pal_hexes_free(pal_hexes *hexes)
     memset(hexes, 0, sizeof *hexes);
 }
 
+double pal_hexes_octants(const pal_hexes *hexes, int e, double min_fill, double octant[8])
+{
+    const double fill = (double)hexes->fill[e], more = fmax(0, min_fill - fill) / 8;
+    for (int q = 0; q < 8; q++)
+        octant[q] = (hexes->octant ? (double)hexes->octant[8 * (size_t)e + (size_t)q] : fill / 8) + more;
+    return fmax(fill, min_fill);
+}
+
 /* The corners when the five are in the order of the splitter and the voxel is a cube: then their volumes are right. The
  * last tetrahedron distinguishes the two patterns. */
 static bool read_pattern(const pal_tets *tets, const int32_t *five, int32_t node[8])

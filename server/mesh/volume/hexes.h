@@ -21,6 +21,8 @@ static inline float pal_octant_sum(const float octant[8])
 }
 
 void pal_hexes_free(pal_hexes *hexes);
+/* Octants of voxel e, raised by the same in each so that they sum to at least min_fill. Returns their sum. [any] */
+double pal_hexes_octants(const pal_hexes *hexes, int e, double min_fill, double octant[8]);
 /* Finds the cubes of edge tets->edge_m that the tetrahedra of a voxel split fill (five each, consecutive, in any order
  * within the five); fill 1, no octants; REFUSED when the mesh is no such split; MEMORY */
 pal_err pal_hexes_find(const pal_tets *tets, pal_hexes *out, pal_diagnostic *diag);
