@@ -288,7 +288,7 @@ static void faults_are_named_with_their_entry(void)
         pal_err err;
     } want[] = {
         {"supports: none, so the body is free", PAL_ERR_REFUSED},
-        {"supports[0]: no node of the body lies in (5, -1, -1) .. (6, 1, 1)", PAL_ERR_REFUSED},
+        {"supports[0]: (5, -1, -1) .. (6, 1, 1) meets nothing of the body", PAL_ERR_REFUSED},
         {"load_cases[0].loads[0]: the region (3.5, -1, -1) .. (3.6, 1, 1) meets no surface", PAL_ERR_REFUSED},
         {"loads[0]: the region (3.4, -1, -1) .. (3.5, 1, 1) meets no surface that faces (-1, 0, 0)", PAL_ERR_REFUSED},
         {"loads[0]: the point (3.4, 0.05, 0.3) lies 0.2 m outside the body", PAL_ERR_REFUSED},
