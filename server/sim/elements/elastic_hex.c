@@ -87,24 +87,6 @@ static bool is_whole(const pal_elastic_hexes *cubes, int e)
     return equal;
 }
 
-/* what the explicit bound of a cut element's corners needs: sums of |K| over their rows, which its rotation leaves */
-static void find_rows(pal_elastic_hexes *cubes, int lane, double row[8][2])
-{
-    for (int part = 0; part < 2; part++) {
-        double k[36][9], size[36];
-        pal_hex_matrix(cubes, lane, part == 0, part == 1, k);
-        for (int p = 0; p < 36; p++) {
-            size[p] = 0;
-            for (int i = 0; i < 9; i++) size[p] += k[p][i] * k[p][i];
-            size[p] = sqrt(size[p]);
-        }
-        for (int c = 0; c < 8; c++) {
-            row[c][part] = 0;
-            for (int d = 0; d < 8; d++) row[c][part] += size[c <= d ? pal_hex_pair(c, d) : pal_hex_pair(d, c)];
-        }
-    }
-}
-
 static pal_err make_weights(pal_elastic_hexes *cubes, pal_arena *arena)
 {
     int n_cut = 0;
@@ -132,8 +114,8 @@ static pal_err make_weights(pal_elastic_hexes *cubes, pal_arena *arena)
         if (cut < 0) continue;
         if (cubes->hex[lane] >= 0 && !is_whole(cubes, cubes->hex[lane])) find_weights(cubes, cubes->hex[lane], weight);
         for (int q = 0; q < 8; q++) cubes->weight[(8 * cut + q) * PAL_LANES + l] = weight[q];
-        find_rows(cubes, lane, cubes->row[PAL_LANES * cut + l]);
     }
+    pal_hex_corot_find_rows(cubes);
     return PAL_ERR_OK;
 }
 

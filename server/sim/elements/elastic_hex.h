@@ -117,6 +117,8 @@ void pal_hex_matrix(const pal_elastic_hexes *cubes, int lane, double mu, double 
 void pal_hex_weights(const pal_elastic_hexes *cubes, int lane, double weight[8]);
 /* adds to each node bounds of its row of K, N/m */
 void pal_hex_corot_bound(const pal_elastic_hexes *cubes, double *bound_N_m);
+/* cubes->row: what the explicit bound of a cut element's corners needs, which its rotation leaves */
+void pal_hex_corot_find_rows(pal_elastic_hexes *cubes);
 void pal_hex_corot_linearise(pal_elastic_hexes *cubes, pal_node_order *node_order);
 void pal_hex_corot_multiply(pal_elastic_hexes *cubes, pal_node_order *node_order, double k);
 /* the tangent's blocks of 8 elements, k K: to [36][9][8] */

@@ -234,6 +234,30 @@ static void cut_pairs(const pal_elastic_hexes *cubes, int block, int l, const pa
         }
 }
 
+void pal_hex_corot_find_rows(pal_elastic_hexes *cubes)
+{
+    for (int block = 0; block < cubes->n_block; block++)
+        for (int l = 0; l < PAL_LANES && pal_hex_is_cut(cubes, block); l += PAL_WIDE)
+            for (int part = 0; part < 2; part++) {
+                const pal_wide stiff[3] = {pal_wide_of(part == 0), pal_wide_of(part == 1),
+                                           pal_wide_of(cubes->beta[part])};
+                pal_wide k[36][9], size[36];
+                cut_pairs(cubes, block, l, stiff, k);
+                for (int p = 0; p < 36; p++) {
+                    size[p] = pal_wide_of(0);
+                    for (int i = 0; i < 9; i++) size[p] += k[p][i] * k[p][i];
+                }
+                for (int m = 0; m < PAL_WIDE; m++) {
+                    double(*row)[2] = cubes->row[PAL_LANES * cubes->cut[block] + l + m];
+                    for (int c = 0; c < 8; c++) {
+                        row[c][part] = 0;
+                        for (int d = 0; d < 8; d++)
+                            row[c][part] += sqrt(size[c <= d ? pal_hex_pair(c, d) : pal_hex_pair(d, c)][m]);
+                    }
+                }
+            }
+}
+
 void pal_hex_matrix(const pal_elastic_hexes *cubes, int lane, double mu, double lambda, double to[36][9])
 {
     const int block = lane / PAL_LANES, l = lane % PAL_LANES / PAL_WIDE * PAL_WIDE;
