@@ -26,7 +26,7 @@ pal_box_text pal_box_describe(const pal_box *box)
 
 bool pal_box_contains(const pal_box *box, const double x[3], double slack)
 {
-    for (int c = 0; c < 3; c++)
+    for (int c = 0; c < 3 && !box->all; c++)
         if (x[c] < box->low_m[c] - slack || x[c] > box->high_m[c] + slack) return false;
     return true;
 }
