@@ -2,13 +2,12 @@
  *
  * Keys: element ("hex8_bbar" | "hex8" | "tet4" | "tet10"; hex8_bbar where the prepared mesh has hexahedra, else tet4),
  * law ("corotational" | "linear" | "neo_hookean"), fill (true: a voxel that the surface cuts has mass and stiffness by
- * what of its octants is inside, of tetrahedra by the share of the voxel, at least PAL_FILL_MIN), twist (hexahedra: as
- * hex_elastic's).
+ * its share inside, at least PAL_FILL_MIN), octants, twist (hexahedra: as hex_elastic's).
  *
  * Components: hex_elastic or tet_elastic with the same keys, viscous where the material has damping, solver
  * implicit_euler. Under static_newton a neo_hookean body has no recovery, because the edges of a region are another
  * material: a corner inverted at a clamped edge is part of the discrete rest state. Masses are lumped: equal shares to
- * the corners, in cut hexahedra by the shape functions at the octants' Gauss points; tet10 by Hinton, Rock and
+ * the corners, with octants by the shape functions at their Gauss points; tet10 by Hinton, Rock and
  * Zienkiewicz (1976), 1/36 of an element to a corner and 4/27 to a middle node, which are all positive. tet10 has its
  * middle nodes behind the mesh's own, whose numbers (skin, supports) stay true.
  */
