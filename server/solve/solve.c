@@ -100,8 +100,12 @@ static pal_err set_entries(const job *j, pal_body_def *body)
     PAL_TRY(pal_entry_put_text(&body->model, "element", o->element, j->diag));
     PAL_TRY(pal_entry_put_text(&body->model, "law", o->law, j->diag));
     PAL_TRY(pal_entry_put_bool(&body->model, "fill", o->voxel.fill, j->diag));
-    if (!strcmp(o->element, "hex8_bbar") && strcmp(o->law, "neo_hookean") != 0)
+    const bool softens = !strcmp(o->element, "hex8_bbar") && strcmp(o->law, "neo_hookean") != 0;
+    if (softens)
         PAL_TRY(pal_entry_put_number(&body->model, "twist", o->twist > 0 ? o->twist : PAL_SOLVE_TWIST, j->diag));
+    else if (o->twist > 0 && o->twist < 1)
+        return PAL_REFUSE(j->diag, "twist %g: it is for hex8_bbar of linear or corotational law, not for %s of law %s",
+                          o->twist, o->element, o->law);
     if (j->s->hex && !o->shares) PAL_TRY(pal_entry_put_bool(&body->model, "octants", true, j->diag));
     pal_entry_init(&body->solver, "solver", "static_newton");
     PAL_TRY(pal_entry_put_number(&body->solver, "tolerance", o->tolerance > 0 ? o->tolerance : 1e-8, j->diag));
