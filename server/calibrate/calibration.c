@@ -172,6 +172,9 @@ static pal_err truth_by_elements(const job *j, int index)
     pal_fit_case *fit = &c->fit[index];
     const pal_tets *t = &c->mesh.tets;
     pal_solve_options o = {.element = "hex8_bbar",
+                           .hold_nodes = true, /* as the springs that are fitted */
+                           .shares = true,
+                           .twist = 1,
                            .law = fit->linear ? "linear" : "neo_hookean",
                            .voxel = c->options.voxel,
                            .split = c->options.split,

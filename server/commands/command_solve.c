@@ -36,8 +36,8 @@ typedef struct lists {
 } lists;
 
 typedef struct arguments {
-    const char *problem, *load_case, *kinematics, *law, *element, *resolution, *samples, *fill, *align, *linear, *free,
-        *folder, *vtk, *csv, *plot;
+    const char *problem, *load_case, *kinematics, *law, *element, *resolution, *samples, *fill, *align, *cut, *support,
+        *linear, *free, *folder, *vtk, *csv, *plot;
     lists list;
     pal_solve_options solve;
 } arguments;
@@ -442,14 +442,23 @@ int command_solve(int argc, char **argv)
         {"--resolution", "LIST", PAL_FLAG_TEXT, &args.resolution, 0, 0,
          "voxels along the longest axis, 1 to 1024, or several in ascending order, separated by commas (32)"},
         {"--fill", "on|off", PAL_FLAG_WORD, &args.fill, 0, 0,
-         "on: a voxel that the surface cuts has its filled share of stiffness; off: voxels at least half filled count\n"
+         "on: a voxel that the surface cuts has the stiffness of what is inside; off: voxels at least half filled "
+         "count\n"
          "whole (on)"},
         {"--least-fill", "SHARE", PAL_FLAG_NUMBER, &o->voxel.min_fill, 1e-6, 1,
-         "cut voxels with a smaller share inside are dropped (0.25 with fill, or 0.02 where that would lose 2.5 %\n"
-         "of the volume; 0.5 without)"},
+         "cut voxels with a smaller share inside are dropped (0.02 of hexahedra by octants;\n"
+         "else 0.25 with fill, or 0.02 where that would lose 2.5 % of the volume; 0.5 without)"},
         {"--align", "on|off", PAL_FLAG_WORD, &args.align, 0, 0,
          "on: voxels are shifted so that their faces lie where a support, else a material, ends inside the body;\n"
          "off: they begin at the bounding box of the surface (on)"},
+        {"--cut", "octants|share", PAL_FLAG_WORD, &args.cut, 0, 0,
+         "hexahedra that the surface cuts have their inside by octants, or spread over them as in a live body "
+         "(octants)"},
+        {"--support", "surface|nodes", PAL_FLAG_WORD, &args.support, 0, 0,
+         "surface: hexahedra stick to the surface that a support's region cuts out of the body, which voxels need not\n"
+         "fit; nodes: the nodes in the region are held (surface)"},
+        {"--twist", "FACTOR", PAL_FLAG_NUMBER, &o->twist, 0.01, 1,
+         "of the stiffness against twists of hex8_bbar, linear or corotational (0.1; 1: as integrated)"},
         {"--split", "K", PAL_FLAG_COUNT, &o->split, 1, 16,
          "every voxel is solved as K x K x K elements of its fill: what error remains is that of the voxel border (1)"},
         {"--samples", "U.csv", PAL_FLAG_TEXT, &args.samples, 0, 0,
@@ -484,6 +493,8 @@ int command_solve(int argc, char **argv)
     o->voxel.resolution = args.list.resolution[0];
     o->voxel.fill = !args.fill || !strcmp(args.fill, "on");
     o->voxel.align = !args.align || !strcmp(args.align, "on");
+    o->shares = args.cut && !strcmp(args.cut, "share");
+    o->hold_nodes = args.support && !strcmp(args.support, "nodes");
     o->linear = args.linear;
     o->inertia_relief = args.free && !strcmp(args.free, "inertia_relief");
     return run(&common, &args);

@@ -105,13 +105,25 @@ static pal_err read_material(const pal_json *at, pal_problem *out, int index)
     return pal_json_number(at, "density", PAL_DENSITY_MIN_KG_M3, PAL_DENSITY_MAX_KG_M3, &m->density_kg_m3);
 }
 
+static pal_err read_normal(const pal_json *at, bool *has, double normal[3])
+{
+    *has = pal_json_has(at, "surface_normal");
+    if (!*has) return PAL_ERR_OK;
+    PAL_TRY(read_vector(at, "surface_normal", 1e9, normal));
+    const double length = pal_norm3(normal);
+    if (!(length > 1e-9)) return pal_json_refuse_key(at, "surface_normal", "has no direction: length %g", length);
+    pal_scale3(normal, 1 / length, normal);
+    return PAL_ERR_OK;
+}
+
 static pal_err read_support(const pal_json *at, pal_problem *out, int index)
 {
     pal_problem_support *s = &out->support[index];
     char type[16] = "";
-    PAL_TRY(read_object(at, WORDS("type", "region", "move", "note"), NULL));
+    PAL_TRY(read_object(at, WORDS("type", "region", "surface_normal", "move", "note"), NULL));
     PAL_TRY(read_word(at, "type", WORDS("fixed", "moved"), type, sizeof type));
     PAL_TRY(read_region(at, &s->region));
+    PAL_TRY(read_normal(at, &s->has_normal, s->normal));
     s->moved = !strcmp(type, "moved");
     if (s->moved) return read_vector(at, "move", PAL_LENGTH_MAX_M, s->move_m);
     if (pal_json_has(at, "move")) return pal_json_refuse_key(at, "move", "only goes with type \"moved\"");
@@ -136,15 +148,9 @@ static pal_err read_traction(const pal_json *at, pal_problem_load *load)
 {
     PAL_TRY(pal_json_object(at, WORDS("type", "region", "surface_normal", "traction", "total_force", "area", "note")));
     PAL_TRY(read_region(at, &load->region));
-    load->has_normal = pal_json_has(at, "surface_normal");
     load->has_traction = pal_json_has(at, "traction");
     load->has_total = pal_json_has(at, "total_force");
-    if (load->has_normal) {
-        PAL_TRY(read_vector(at, "surface_normal", 1e9, load->normal));
-        double length = pal_norm3(load->normal);
-        if (!(length > 1e-9)) return pal_json_refuse_key(at, "surface_normal", "has no direction: length %g", length);
-        pal_scale3(load->normal, 1 / length, load->normal);
-    }
+    PAL_TRY(read_normal(at, &load->has_normal, load->normal));
     if (!load->has_traction && !load->has_total) return pal_json_refuse(at, "needs traction (Pa) or total_force (N)");
     if (load->has_traction) PAL_TRY(read_vector(at, "traction", 1e15, load->traction_Pa));
     if (load->has_total) PAL_TRY(read_vector(at, "total_force", 1e15, load->total_N));

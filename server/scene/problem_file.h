@@ -15,7 +15,8 @@
  *   }],
  *   "supports": [                                                 0 to 8; none: a body that is free                 R
  *     {"type": "fixed", "region": REGION},                                   all points inside stay where they are
- *     {"type": "moved", "region": REGION, "move": [0, 0, 0.001]}             all points inside are displaced by move, m
+ *     {"type": "moved", "region": REGION, "move": [0, 0, 0.001],            all points inside are displaced by move, m
+ *      "surface_normal": [0, 0, 1]}           either: only the part of the surface in the region that faces this way
  *   ],
  *   "load_cases": [{"id": "tip", "loads": [                                                 1 to 16, of 1 to 8 loads R
  *     {"type": "dead_traction", "region": REGION,                 on the part of the surface inside the region ...

@@ -9,12 +9,12 @@
 
 /* how the surface becomes voxels */
 typedef struct pal_case_voxel_options {
-    int resolution; /* voxels on the longest axis */
-    bool fill;      /* scale cut voxels by their filled share; false: keep voxels at least half filled, as full ones */
-    /* cut voxels with a smaller share are dropped; 0: with fill 0.25, or 0.02 where that would lose 2.5 % of the
-     * volume; without fill 0.5 */
-    double min_fill;
-    bool align; /* shift the voxels so that their faces lie on the border of a support that cuts the body */
+    int resolution;  /* voxels on the longest axis */
+    bool fill;       /* cut voxels count by what is inside; false: keep voxels at least half filled, as full ones */
+    double min_fill; /* cut voxels with a smaller share are dropped; 0: as in a live body (pal_filled_voxels_make), 0.5
+                        without fill */
+    double ahead[3]; /* without align: by how many voxels, 0 to 1, the grid begins before the body */
+    bool align;      /* shift the voxels so that their faces lie on the border of a support that cuts the body */
 } pal_case_voxel_options;
 
 /* Components that no support of the problem fixes are dropped or refused (mesh/volume/loose_components.h). Errors:

@@ -9,10 +9,14 @@
 #include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/files/vtk_file.h"
+#include "server/sim/elements/elastic_hex.h"
 #include "server/sim/world/world.h"
+#include "server/solve/surface_supports.h"
+#include "server/solve/tuning.h"
 #include "server/solve/voxel_refinement.h"
 
 #include <stdio.h>
+#include <string.h>
 
 enum { NEWTON_A_STEP = 4, MAX_NEWTON = 400, MAX_RAMP = 40 };
 static const double step_s = 1.0 / 60; /* not used by a static solver */
@@ -22,6 +26,7 @@ struct pal_solution {
     pal_world *world;
     pal_locate *locate;
     pal_body *body;
+    pal_ground ground; /* n 0: supports hold nodes */
     bool hex;
 };
 
@@ -95,12 +100,40 @@ static pal_err set_entries(const job *j, pal_body_def *body)
     PAL_TRY(pal_entry_put_text(&body->model, "element", o->element, j->diag));
     PAL_TRY(pal_entry_put_text(&body->model, "law", o->law, j->diag));
     PAL_TRY(pal_entry_put_bool(&body->model, "fill", o->voxel.fill, j->diag));
+    const bool softens = !strcmp(o->element, "hex8_bbar") && strcmp(o->law, "neo_hookean") != 0;
+    if (softens)
+        PAL_TRY(pal_entry_put_number(&body->model, "twist", o->twist > 0 ? o->twist : PAL_SOLVE_TWIST, j->diag));
+    else if (o->twist > 0 && o->twist < 1)
+        return PAL_REFUSE(j->diag, "twist %g: it is for hex8_bbar of linear or corotational law, not for %s of law %s",
+                          o->twist, o->element, o->law);
+    if (j->s->hex && !o->shares) PAL_TRY(pal_entry_put_bool(&body->model, "octants", true, j->diag));
     pal_entry_init(&body->solver, "solver", "static_newton");
     PAL_TRY(pal_entry_put_number(&body->solver, "tolerance", o->tolerance > 0 ? o->tolerance : 1e-8, j->diag));
     PAL_TRY(pal_entry_put_number(&body->solver, "newton", NEWTON_A_STEP, j->diag));
     if (o->linear) PAL_TRY(pal_entry_put_text(&body->solver, "linear", o->linear, j->diag));
     if (o->inertia_relief && j->problem->n_support == 0)
         PAL_TRY(pal_entry_put_text(&body->solver, "free", "inertia_relief", j->diag));
+    return PAL_ERR_OK;
+}
+
+/* supports on their surface where the voxels' octants are known and the surface is closed */
+static pal_err set_supports(const job *j, pal_body_def *body)
+{
+    pal_solution *s = j->s;
+    pal_surface_topology topology = {.closed = false};
+    bool surface =
+        s->hex && !j->options->hold_nodes && !j->options->shares && j->options->voxel.fill && s->mesh.hexes.octant;
+    for (int k = 0; k < j->problem->n_support; k++)
+        surface = surface && (!j->problem->support[k].region.all || j->problem->support[k].has_normal);
+    if (surface && pal_surface_check(&s->mesh.surface, &topology))
+        return pal_diagnostic_set(j->diag, PAL_ERR_MEMORY, "no memory to look at the surface");
+    if (!surface || !topology.closed) {
+        body->n_support = j->problem->n_support;
+        return pal_case_supports(j->problem, &s->mesh.tets, body->support, j->diag);
+    }
+    PAL_TRY(pal_surface_supports_make(j->problem, j->options->young_Pa, s->locate, &s->mesh, &s->ground, j->diag));
+    body->n_support = pal_surface_supports_held(j->problem, &s->mesh, body->support);
+    body->ground = &s->ground;
     return PAL_ERR_OK;
 }
 
@@ -122,8 +155,7 @@ static pal_err make_world(const job *j)
     body->output.name[0] = 0;
     pal_err err = set_materials(j, body);
     body->material.damping_1_s = 0;
-    body->n_support = j->problem->n_support;
-    if (!err) err = pal_case_supports(j->problem, &j->s->mesh.tets, body->support, j->diag);
+    if (!err) err = set_supports(j, body);
     if (!err) err = set_entries(j, body);
     if (!err) err = pal_world_create(scene, j->diag, &j->s->world);
     free(scene);
@@ -154,6 +186,7 @@ static pal_err set_loads(const job *j)
 static void move_supports(const job *j, double share)
 {
     pal_body *b = j->s->body;
+    pal_surface_supports_move(&j->s->ground, j->problem, share);
     for (int i = 0; i < b->n_node; i++) {
         double x[3];
         if (!b->support[i]) continue;
@@ -217,6 +250,22 @@ static double factored(const job *j)
     return j->result->assemble_s + j->result->factor_s;
 }
 
+/* the penalty's forces sum over the shape functions, which are 1 together */
+static void add_ground_reaction(const pal_solution *s, double sum_N[3])
+{
+    const pal_body *b = s->body;
+    for (int i = 0; i < s->ground.n; i++) {
+        const pal_ground_item *item = &s->ground.item[i];
+        for (int p = 0; p < 64; p++) {
+            const int c = p / 8, d = p % 8;
+            const double k = item->k_N_m[c <= d ? pal_hex_pair(c, d) : pal_hex_pair(d, c)];
+            const int32_t node = b->hexes->node[8 * item->element + d];
+            for (int a = 0; a < 3; a++)
+                sum_N[a] -= k * (b->x[3 * node + a] - b->x_rest[3 * node + a] - item->move_m[a]);
+        }
+    }
+}
+
 static void sum_up(const job *j)
 {
     const pal_body *b = j->s->body;
@@ -228,6 +277,7 @@ static void sum_up(const job *j)
         r->work_J += b->external_force ? pal_dot3(b->external_force + 3 * i, u) : 0;
         if (b->support[i]) pal_axpy3(r->reaction_N, -1, b->f + 3 * i);
     }
+    add_ground_reaction(j->s, r->reaction_N);
     r->energy_J = pal_world_energy_J(j->s->world);
 }
 
@@ -247,19 +297,26 @@ static pal_err prepare(const job *j, const pal_surface *surface)
 {
     const pal_solve_options *o = j->options;
     pal_solution *s = j->s;
-    PAL_TRY(pal_case_voxels(j->problem, surface, &o->voxel, &s->mesh, j->diag));
+    pal_case_voxel_options voxel = o->voxel;
+    s->hex = !strncmp(o->element, "hex8", 4);
+    if (s->hex && voxel.fill && !o->shares && !(voxel.min_fill > 0)) voxel.min_fill = PAL_FILL_MIN;
+    PAL_TRY(pal_case_voxels(j->problem, surface, &voxel, &s->mesh, j->diag));
+    if (o->shares) {
+        free(s->mesh.hexes.octant);
+        s->mesh.hexes.octant = NULL;
+    }
     if (o->split > 1) PAL_TRY(pal_refine_voxels(&s->mesh, o->split, j->diag));
+    pal_err err = pal_locate_create(&s->mesh.tets, s->hex ? &s->mesh.hexes : NULL, &s->locate);
+    if (err) return pal_diagnostic_set(j->diag, err, "no memory to find points in the mesh");
     PAL_TRY(make_world(j));
     const pal_body *b = s->body;
-    s->hex = b->n_corner == 8;
     j->result->n_node = b->n_node;
     j->result->n_element = b->n_element;
     j->result->edge_m = b->edge_m;
     j->result->volume_m3 = volume_of(s);
     for (int i = 0; i < b->n_node; i++) j->result->n_fixed += b->support[i] != 0;
     j->result->n_dof = 3 * (b->n_node - j->result->n_fixed);
-    pal_err err = pal_locate_create(&s->mesh.tets, s->hex ? &s->mesh.hexes : NULL, &s->locate);
-    return err ? pal_diagnostic_set(j->diag, err, "no memory to find points in the mesh") : PAL_ERR_OK;
+    return PAL_ERR_OK;
 }
 
 pal_err pal_solve(const pal_problem *problem, const pal_problem_case *load_case, const pal_surface *surface,
@@ -299,6 +356,7 @@ void pal_solution_free(pal_solution *solution)
     if (!solution) return;
     pal_locate_destroy(solution->locate);
     pal_world_destroy(solution->world);
+    free(solution->ground.item);
     pal_prepared_free(&solution->mesh);
     free(solution);
 }

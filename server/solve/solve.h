@@ -11,6 +11,10 @@ typedef struct pal_solve_options {
     pal_case_voxel_options voxel;
     /* each voxel is solved as split^3 voxels of its fill, which separates the element error from the border's; 0: 1 */
     int split;
+    bool hold_nodes;          /* supports hold the nodes in them; false: of hexahedra with fill their surface
+                                 (surface_supports.h) */
+    bool shares;              /* cut hexahedra have their inside spread evenly, as a live body has; false: by octants */
+    double twist;             /* of hex8_bbar, linear or corotational (elements/elastic_hex.h); 0: PAL_SOLVE_TWIST */
     double tolerance;         /* of the residual, relative to the loads; 0: 1e-8 */
     int max_newton;           /* NUMERIC after this many Newton iterations; 0: 400 */
     const char *linear;       /* "direct" | "pcg"; NULL: chosen automatically */
@@ -23,7 +27,7 @@ typedef struct pal_solve_options {
 
 typedef struct pal_solve_result {
     int n_node, n_element, n_dof, n_newton, n_cg;
-    int n_fixed; /* nodes in supports                                         */
+    int n_fixed; /* nodes that are held                                       */
     double residual;
     double prepare_s, assemble_s, factor_s, solve_s, total_s; /* solve_s: Newton without assembly and factorisation */
     double edge_m;                     /* voxel edge                                                */

@@ -1,5 +1,6 @@
 #include "server/solve/voxel_refinement.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 
 #include <stdlib.h>
@@ -19,8 +20,8 @@ static size_t cell(const int n[3], int x, int y, int z)
     return (size_t)x + (size_t)n[0] * ((size_t)y + (size_t)n[1] * (size_t)z);
 }
 
-/* voxel lattice with an empty layer around it; fill [n2][n1][n0], 0 where there is no voxel */
-static pal_err make_coarse(const pal_prepared *mesh, double low[3], int n[3], float **fill)
+/* voxel lattice with an empty layer around it; octant [n2][n1][n0][8], 0 where there is no voxel */
+static pal_err make_coarse(const pal_prepared *mesh, double low[3], int n[3], float **octant)
 {
     const pal_tets *t = &mesh->tets;
     double high[3];
@@ -30,23 +31,38 @@ static pal_err make_coarse(const pal_prepared *mesh, double low[3], int n[3], fl
         n[c] = (int)floor((high[c] - low[c]) / t->edge_m + 0.5) + 2;
         low[c] -= t->edge_m;
     }
-    *fill = calloc((size_t)n[0] * (size_t)n[1] * (size_t)n[2], sizeof **fill);
-    if (!*fill) return PAL_ERR_MEMORY;
+    *octant = calloc(8 * (size_t)n[0] * (size_t)n[1] * (size_t)n[2], sizeof **octant);
+    if (!*octant) return PAL_ERR_MEMORY;
     for (int e = 0; e < mesh->hexes.n_hex; e++) {
         int at[3];
         lattice_of(t, &mesh->hexes, e, low, t->edge_m, at);
-        (*fill)[cell(n, at[0], at[1], at[2])] = fmaxf(mesh->hexes.fill[e], 1e-6f);
+        float *to = *octant + 8 * cell(n, at[0], at[1], at[2]);
+        for (int q = 0; q < 8; q++)
+            to[q] = mesh->hexes.octant ? mesh->hexes.octant[8 * (size_t)e + (size_t)q] : mesh->hexes.fill[e] / 8;
     }
     return PAL_ERR_OK;
 }
 
-/* the fine grid, with voxels where the coarse one has them */
-static pal_err make_fine(const pal_prepared *mesh, const double low[3], const int n[3], const float *fill, int split,
+/* Octants of the fine voxel at `at`: each lies within one octant of the coarse voxel, whose inside is spread evenly.
+ * Returns the fill. */
+static float fine_octants(const int n[3], const float *coarse, int split, const int at[3], float octant[8])
+{
+    const float *from = coarse + 8 * cell(n, at[0] / split, at[1] / split, at[2] / split);
+    for (int q = 0; q < 8; q++) {
+        int in = 0;
+        for (int c = 0; c < 3; c++) in |= (2 * (at[c] % split) + (q >> c & 1) >= split) << c;
+        octant[q] = from[in];
+    }
+    return pal_octant_sum(octant);
+}
+
+/* the fine grid, with voxels where the coarse one has something inside */
+static pal_err make_fine(const pal_prepared *mesh, const double low[3], const int n[3], const float *coarse, int split,
                          pal_voxels *out)
 {
     size_t n_cell = 1;
-    *out = (pal_voxels){.edge_m = mesh->tets.edge_m / split,
-                        .n_inside = (int64_t)mesh->hexes.n_hex * split * split * split};
+    float octant[8];
+    *out = (pal_voxels){.edge_m = mesh->tets.edge_m / split};
     for (int c = 0; c < 3; c++) {
         out->n[c] = n[c] * split;
         out->low_m[c] = low[c];
@@ -58,7 +74,8 @@ static pal_err make_fine(const pal_prepared *mesh, const double low[3], const in
     for (int z = 0; z < out->n[2]; z++)
         for (int y = 0; y < out->n[1]; y++)
             for (int x = 0; x < out->n[0]; x++)
-                if (fill[cell(n, x / split, y / split, z / split)] > 0) out->kind[cell(out->n, x, y, z)] = 2;
+                if (fine_octants(n, coarse, split, (int[3]){x, y, z}, octant) > 0)
+                    out->kind[cell(out->n, x, y, z)] = 2, out->n_inside++;
     return PAL_ERR_OK;
 }
 
@@ -66,7 +83,7 @@ pal_err pal_refine_voxels(pal_prepared *mesh, int split, pal_diagnostic *diag)
 {
     double low[3];
     int n[3], n_hex = mesh->hexes.n_hex;
-    float *fill = NULL;
+    float *coarse = NULL;
     pal_voxels fine = {0};
     pal_tets tets = {0};
     pal_hexes hexes = {0};
@@ -74,16 +91,17 @@ pal_err pal_refine_voxels(pal_prepared *mesh, int split, pal_diagnostic *diag)
     if ((double)n_hex * split * split * split > MAX_HEXAHEDRA)
         return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "%d voxels split by %d on each axis are more than %d", n_hex,
                                   split, MAX_HEXAHEDRA);
-    pal_err err = make_coarse(mesh, low, n, &fill);
-    if (!err) err = make_fine(mesh, low, n, fill, split, &fine);
+    pal_err err = make_coarse(mesh, low, n, &coarse);
+    if (!err) err = make_fine(mesh, low, n, coarse, split, &fine);
     if (!err) err = pal_voxels_split(&fine, &tets);
     if (!err) err = pal_hexes_find(&tets, &hexes, diag);
+    if (!err) PAL_ARRAY(&err, hexes.octant, 8 * (size_t)hexes.n_hex);
     for (int e = 0; e < hexes.n_hex && !err; e++) {
         int at[3];
         lattice_of(&tets, &hexes, e, low, fine.edge_m, at);
-        hexes.fill[e] = fill[cell(n, at[0] / split, at[1] / split, at[2] / split)];
+        hexes.fill[e] = fine_octants(n, coarse, split, at, hexes.octant + 8 * (size_t)e);
     }
-    free(fill);
+    free(coarse);
     pal_voxels_free(&fine);
     if (err) {
         pal_tets_free(&tets);

@@ -91,7 +91,7 @@ static bool make_scene(const subject *s, solved *to, const char *solver)
 /* mesh, world and nodal loads; at rest without loads */
 static bool prepare(const subject *s, int resolution, const char *solver, solved *to)
 {
-    pal_case_voxel_options requested = {resolution, true, 0, true};
+    pal_case_voxel_options requested = {.resolution = resolution, .fill = true, .align = true};
     pal_diagnostic diag = {""};
     memset(to, 0, sizeof *to);
     bool good = !pal_case_voxels(s->problem, s->surface, &requested, &to->mesh, &diag) && make_scene(s, to, solver) &&

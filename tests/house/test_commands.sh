@@ -465,7 +465,7 @@ run solve bad.json --case tip
 refused 1 "bad.json: materials\[0\].young: unknown key"
 bad 's/"max": \[1e-6,/"max": [-1e-6,/'
 run solve bad.json --case tip
-refused 1 "bad.json: supports\[0\]: no node of the body lies in (-0.01, -0.03, -0.03)"
+refused 1 "bad.json: supports\[0\]: (-0.01, -0.03, -0.03)"
 bad 's/"min": \[0.319999,/"min": [0.3201,/'
 run solve bad.json --case tip
 refused 1 "bad.json: load_cases\[0\].loads\[0\]: the region (0.3201, -0.03, -0.03) .. (0.33, 0.03, 0.03) meets no surface"

@@ -87,7 +87,7 @@ static void beam_problem(pal_problem *p)
 }
 
 static const pal_solve_options beam_options = {
-    .element = "hex8_bbar", .law = "linear", .voxel.fill = true, .young_Pa = NAN, .poisson = NAN};
+    .element = "hex8_bbar", .law = "linear", .voxel.fill = true, .twist = 1, .young_Pa = NAN, .poisson = NAN};
 
 static void a_beam_converges_and_richardson_knows_by_how_much(void)
 {

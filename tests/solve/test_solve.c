@@ -288,15 +288,16 @@ static void faults_are_named_with_their_entry(void)
         pal_err err;
     } want[] = {
         {"supports: none, so the body is free", PAL_ERR_REFUSED},
-        {"supports[0]: no node of the body lies in (5, -1, -1) .. (6, 1, 1)", PAL_ERR_REFUSED},
+        {"supports[0]: (5, -1, -1) .. (6, 1, 1) meets nothing of the body", PAL_ERR_REFUSED},
         {"load_cases[0].loads[0]: the region (3.5, -1, -1) .. (3.6, 1, 1) meets no surface", PAL_ERR_REFUSED},
         {"loads[0]: the region (3.4, -1, -1) .. (3.5, 1, 1) meets no surface that faces (-1, 0, 0)", PAL_ERR_REFUSED},
         {"loads[0]: the point (3.4, 0.05, 0.3) lies 0.2 m outside the body", PAL_ERR_REFUSED},
         {"material \"m\": nu 0.5 is not a Poisson ratio", PAL_ERR_REFUSED},
         {"material \"m\": nu -1 is not a Poisson ratio", PAL_ERR_REFUSED},
         {"material \"m\": E 0 Pa is not a stiffness", PAL_ERR_REFUSED},
-        {"stopped", PAL_ERR_STATE}};
-    for (int k = 0; k < 9; k++) {
+        {"stopped", PAL_ERR_STATE},
+        {"twist 0.5: it is for hex8_bbar of linear or corotational law, not for tet4 of law", PAL_ERR_REFUSED}};
+    for (int k = 0; k < 10; k++) {
         pal_problem p = bar_problem();
         pal_solve_options o = options_of("hex8_bbar", "corotational");
         pal_problem_load *l = &p.load_case[0].load[0];
@@ -313,6 +314,7 @@ static void faults_are_named_with_their_entry(void)
         if (k == 6) o.poisson = -1;
         if (k == 7) o.young_Pa = 0;
         if (k == 8) o.progress = stop, o.user = &left;
+        if (k == 9) o.element = "tet4", o.twist = 0.5;
         CHECK_INT(solve(&p, &o, &s, &r, &diag), want[k].err);
         CHECK(s == NULL);
         if (!strstr(diag.text, want[k].sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", diag.text, want[k].sentence);

@@ -258,6 +258,7 @@ static double between(const pal_problem *p, const pal_surface *beam, int size, i
                                .voxel.resolution = k ? other : size,
                                .voxel.fill = true,
                                .voxel.align = true,
+                               .twist = 1, /* as a live body */
                                .young_Pa = NAN,
                                .poisson = NAN};
         if (pal_solve(p, &p->load_case[0], beam, &o, &s[k], &r, &diag)) CHECK_FAIL("%s", diag.text);

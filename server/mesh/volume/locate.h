@@ -32,4 +32,9 @@ typedef struct pal_quadrature_point {
  * region meets no surface. MEMORY */
 pal_err pal_locate_surface(const pal_locate *locate, const pal_surface *surface, const double low[3],
                            const double high[3], const double *normal, pal_quadrature_point **out, int *n_piece);
+/* The part inside a closed surface of the face of a box that is normal to `axis`, at high (side 1) or low (side -1): by
+ * the divergence theorem the surface beyond the face, projected on it, so that areas may be negative and their sums of
+ * polynomials of degree 4 are exact in voxels. A point belongs to the element beyond the face. As above otherwise */
+pal_err pal_locate_section(const pal_locate *locate, const pal_surface *surface, const double low[3],
+                           const double high[3], int axis, int side, pal_quadrature_point **out, int *n_piece);
 #endif

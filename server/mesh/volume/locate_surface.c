@@ -14,6 +14,8 @@
 #define COS_OFF 0.90630778703664996324
 #define CRUMB   1e-15
 #define ON_FACE 1e-12
+/* of a voxel: a piece in a plane between voxels belongs to the one beyond it */
+#define BEYOND 1e-7
 enum { MAX_PEEL = 24 };
 
 typedef struct cutter {
@@ -23,6 +25,8 @@ typedef struct cutter {
     double low[3], h; /* of the voxel lattice */
     double normal[3]; /* of the triangle at hand */
     double crumb_m2;
+    int axis;          /* of the plane that pieces are projected on; -1: they stay */
+    double side, at_m; /* +-1, the direction beyond the plane; its place            */
     pal_quadrature_point *piece;
     size_t n;
     bool full; /* out of memory */
@@ -57,6 +61,11 @@ static void add_points(cutter *c, const pal_polygon *p, int element)
             piece->element = element;
             piece->area_m2 = area * pal_tri_gauss[q][3];
             pal_copy3(piece->normal, c->normal);
+            if (c->axis >= 0) {
+                piece->area_m2 *= c->side * c->normal[c->axis];
+                for (int k = 0; k < 3; k++) piece->normal[k] = k == c->axis ? c->side : 0;
+                x[c->axis] = c->at_m;
+            }
             pal_locate_local(c->locate, element, x, piece->local);
         }
     }
@@ -66,6 +75,10 @@ static int element_at_middle(const cutter *c, const pal_polygon *p, double *outs
 {
     double middle[3] = {0}, local[4];
     for (int i = 0; i < p->n; i++) pal_axpy3(middle, 1.0 / p->n, p->x[i]);
+    if (c->axis >= 0) middle[c->axis] = c->at_m + BEYOND * c->side * c->h;
+    /* what cancels must be in the same element, also where there is none at the middle */
+    for (int k = 0; k < 3 && c->axis >= 0; k++)
+        middle[k] = c->low[k] + c->h * (floor((middle[k] - c->low[k]) / c->h) + 0.5);
     return pal_locate_point(c->locate, middle, local, outside_m);
 }
 
@@ -140,24 +153,41 @@ static void add_triangle(cutter *c, const pal_surface *surface, size_t t, const 
     cut_lattice(c, &p, 0);
 }
 
+static pal_err cut_surface(cutter *c, const pal_surface *surface, const double low[3], const double high[3],
+                           const double *normal, pal_quadrature_point **out, int *n_piece)
+{
+    double top[3];
+    c->tets = pal_locate_mesh(c->locate, &c->hex);
+    c->h = c->tets->edge_m;
+    /* the lattice of a voxel split begins at the lowest corner of the mesh */
+    pal_box3_empty(c->low, top);
+    for (size_t i = 0; i < (size_t)c->tets->n_node; i++) pal_box3_add(c->low, top, c->tets->x + 3 * i);
+    for (size_t t = 0; t < (size_t)surface->n_tri && !c->full; t++) add_triangle(c, surface, t, low, high, normal);
+    if (c->full) {
+        free(c->piece);
+        return PAL_ERR_MEMORY;
+    }
+    *out = c->piece;
+    *n_piece = (int)c->n;
+    return PAL_ERR_OK;
+}
+
 pal_err pal_locate_surface(const pal_locate *locate, const pal_surface *surface, const double low[3],
                            const double high[3], const double *normal, pal_quadrature_point **out, int *n_piece)
 {
-    double unit[3], top[3];
-    cutter c = {.locate = locate};
-    c.tets = pal_locate_mesh(locate, &c.hex);
-    c.h = c.tets->edge_m;
-    /* the lattice of a voxel split begins at the lowest corner of the mesh */
-    pal_box3_empty(c.low, top);
-    for (size_t i = 0; i < (size_t)c.tets->n_node; i++) pal_box3_add(c.low, top, c.tets->x + 3 * i);
+    double unit[3];
+    cutter c = {.locate = locate, .axis = -1};
     if (normal && !pal_unit3(unit, normal, 0)) normal = NULL;
-    for (size_t t = 0; t < (size_t)surface->n_tri && !c.full; t++)
-        add_triangle(&c, surface, t, low, high, normal ? unit : NULL);
-    if (c.full) {
-        free(c.piece);
-        return PAL_ERR_MEMORY;
-    }
-    *out = c.piece;
-    *n_piece = (int)c.n;
-    return PAL_ERR_OK;
+    return cut_surface(&c, surface, low, high, normal ? unit : NULL, out, n_piece);
+}
+
+pal_err pal_locate_section(const pal_locate *locate, const pal_surface *surface, const double low[3],
+                           const double high[3], int axis, int side, pal_quadrature_point **out, int *n_piece)
+{
+    double from[3], to[3];
+    cutter c = {.locate = locate, .axis = axis, .side = side, .at_m = side > 0 ? high[axis] : low[axis]};
+    pal_copy3(from, low), pal_copy3(to, high);
+    from[axis] = side > 0 ? c.at_m : -INFINITY;
+    to[axis] = side > 0 ? INFINITY : c.at_m;
+    return cut_surface(&c, surface, from, to, NULL, out, n_piece);
 }

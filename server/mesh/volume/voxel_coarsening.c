@@ -5,18 +5,24 @@
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/tuning.h"
 
-/* the coarse lattice and the fill of its cells */
+/* the coarse lattice and the inside of its cells */
 typedef struct grid {
     pal_voxels voxels; /* kind is set last    */
     size_t n_cell;
-    float *fill; /* [n2][n1][n0]        */
+    float *octant; /* what the eight voxels of a cell hold [n2][n1][n0][8] */
 } grid;
 
-static size_t cell(const grid *g, const double *x)
+/* the cell at x; octant: the one of it, may be NULL */
+static size_t cell(const grid *g, const double *x, size_t *octant)
 {
     const pal_voxels *v = &g->voxels;
-    size_t at[3];
-    for (int c = 0; c < 3; c++) at[c] = (size_t)floor((x[c] - v->low_m[c]) / v->edge_m);
+    size_t at[3], in = 0;
+    for (int c = 0; c < 3; c++) {
+        const double place = (x[c] - v->low_m[c]) / v->edge_m;
+        at[c] = (size_t)floor(place);
+        in |= (size_t)(place - floor(place) > 0.5) << c;
+    }
+    if (octant) *octant = in;
     return at[0] + (size_t)v->n[0] * (at[1] + (size_t)v->n[1] * at[2]);
 }
 
@@ -41,12 +47,14 @@ static pal_err make_grid(const pal_tets *tets, const pal_hexes *hexes, const int
         v->n[c] = (int)ceil((high[c] - v->low_m[c]) / v->edge_m - 1e-6);
         g->n_cell *= (size_t)v->n[c];
     }
-    PAL_ZEROED(&err, g->fill, g->n_cell);
+    PAL_ZEROED(&err, g->octant, 8 * g->n_cell);
     PAL_ZEROED(&err, v->kind, g->n_cell);
     for (int e = 0; e < hexes->n_hex && !err; e++) {
         double x[3];
+        size_t octant, at;
         middle(tets, hexes, e, x);
-        g->fill[cell(g, x)] += fmaxf(hexes->fill[e], 1e-6f) / 8;
+        at = cell(g, x, &octant);
+        g->octant[8 * at + octant] = fmaxf(hexes->fill[e], 1e-6f) / 8;
     }
     return err;
 }
@@ -56,18 +64,21 @@ static void keep_voxels(grid *g, double min_fill)
 {
     double all = 0, gone = 0;
     for (size_t i = 0; i < g->n_cell; i++) {
-        all += (double)g->fill[i];
-        if ((double)g->fill[i] < min_fill) gone += (double)g->fill[i];
+        const double fill = (double)pal_octant_sum(g->octant + 8 * i);
+        all += fill;
+        if (fill < min_fill) gone += fill;
     }
     if (gone > COARSE_MAX_LOSS * all) min_fill = 0;
-    for (size_t i = 0; i < g->n_cell; i++)
-        if (g->fill[i] > 0 && !((double)g->fill[i] < min_fill)) g->voxels.kind[i] = 2, g->voxels.n_inside++;
+    for (size_t i = 0; i < g->n_cell; i++) {
+        const double fill = (double)pal_octant_sum(g->octant + 8 * i);
+        if (fill > 0 && !(fill < min_fill)) g->voxels.kind[i] = 2, g->voxels.n_inside++;
+    }
 }
 
 pal_err pal_voxels_coarsen(const pal_tets *tets, const pal_hexes *hexes, const int shift[3], double min_fill,
                            pal_prepared *out, pal_diagnostic *diag)
 {
-    grid g = {.fill = NULL};
+    grid g = {.octant = NULL};
     pal_prepared p = {0};
     if (hexes->n_hex == 0) return PAL_REFUSE(diag, "there are no voxels to make larger");
     pal_err err = make_grid(tets, hexes, shift, &g);
@@ -76,12 +87,15 @@ pal_err pal_voxels_coarsen(const pal_tets *tets, const pal_hexes *hexes, const i
         err = pal_voxels_split(&g.voxels, &p.tets);
     }
     if (!err) err = pal_hexes_find(&p.tets, &p.hexes, diag);
+    if (!err) PAL_ARRAY(&err, p.hexes.octant, 8 * (size_t)p.hexes.n_hex);
     for (int e = 0; e < p.hexes.n_hex && !err; e++) {
         double x[3];
+        float *octant = p.hexes.octant + 8 * (size_t)e;
         middle(&p.tets, &p.hexes, e, x);
-        p.hexes.fill[e] = fminf(g.fill[cell(&g, x)], 1);
+        memcpy(octant, g.octant + 8 * cell(&g, x, NULL), 8 * sizeof *octant);
+        p.hexes.fill[e] = pal_octant_sum(octant);
     }
-    free(g.fill);
+    free(g.octant);
     pal_voxels_free(&g.voxels);
     p.hexes.measured = true;
     if (err) {

@@ -1,5 +1,5 @@
-/* Voxels of twice the edge that fill the same body: each takes the mean fill of its eight voxels (0 for one that does
- * not exist), so the volume is the same. Every second plane of the fine mesh is a plane of the coarse one; `shift`
+/* Voxels of twice the edge that fill the same body: the octants of each are its eight voxels (0 for one that does not
+ * exist), so the volume is the same. Every second plane of the fine mesh is a plane of the coarse one; `shift`
  * selects which. Heap; thread: [load]. */
 #ifndef PAL_MESH_VOLUME_VOXEL_COARSENING_H
 #define PAL_MESH_VOLUME_VOXEL_COARSENING_H

@@ -128,7 +128,7 @@ static pal_err keep_voxels(const pal_surface *surface, const pal_bits *inside, c
     if (options->border && options->min_fill > 0) {
         dropper d = {&border, options->min_fill};
         report->n_dropped = pal_bits_count(&border);
-        err = pal_voxels_fraction(surface, voxels, drop_layer, &d, diag);
+        err = pal_voxels_fraction(surface, voxels, 1, drop_layer, &d, diag);
         report->n_dropped -= pal_bits_count(&border);
     }
     /* components of all kept voxels */

@@ -1,4 +1,4 @@
-/* The fraction of a voxel that lies inside a surface.
+/* The fraction of a voxel, or of each of its octants, that lies inside a surface.
  *
  * A point lies inside a closed outward surface when a ray from it along +x leaves once more often than it enters.
  * Integrated over a voxel this is the divergence theorem (server/mesh/README.md, fill), exact for triangles.
@@ -23,13 +23,15 @@ enum { MAX_PLACE = 1 << 27 };
 
 typedef struct sweep {
     const pal_scan_surface *scan;
-    const int *n;
+    int split;     /* parts of a voxel along an axis                           */
+    int n[3];      /* parts of the grid                                        */
     double sign;   /* +1, or -1 for a surface that faces inward                */
     int32_t *tri;  /* triangles by their first layer              [n_tri]      */
     int32_t *from; /* where a layer's triangles begin             [n2+2]       */
     int32_t *live; /* triangles that reach into the layer         [n_tri]      */
-    double *own;   /* of pieces in the voxel itself               [n1][n0]     */
-    double *pass;  /* of pieces behind: for all voxels before them  [n1][n0+1] */
+    double *own;   /* of pieces in the part itself                [n1][n0]     */
+    double *pass;  /* of pieces behind: for all parts before them   [n1][n0+1] */
+    bool *met;     /* rows that the surface meets                   [n1]       */
 } sweep;
 
 static double grid_units(int32_t p)
@@ -65,6 +67,7 @@ static void add_row(const sweep *s, pal_polygon *p, int y)
     pal_polygon_range(p, 0, &min, &max);
     if (max <= 0) return;
     pal_polygon low, high;
+    s->met[y] = true;
     pal_polygon_clip(p, 0, 0, INFINITY);
     int from = clamp_int(floor(min), 0, s->n[0]), to = clamp_int(ceil(max) - 1, from, s->n[0]);
     for (int x = from; x < to; x++) {
@@ -79,7 +82,7 @@ static void add_row(const sweep *s, pal_polygon *p, int y)
 static void add_triangle(const sweep *s, size_t t, int z)
 {
     pal_polygon p = {.n = 3}, low, high;
-    for (int k = 0; k < 9; k++) p.x[k / 3][k % 3] = grid_units(pal_scan_corner(s->scan, t, k / 3)[k % 3]);
+    for (int k = 0; k < 9; k++) p.x[k / 3][k % 3] = s->split * grid_units(pal_scan_corner(s->scan, t, k / 3)[k % 3]);
     double min, max;
     pal_polygon_clip(&p, 2, z, z + 1);
     if (p.n < 3) return;
@@ -103,9 +106,9 @@ static bool find_layers(const sweep *s, size_t t, int *from, int *to)
     if (((int64_t)b[1] - a[1]) * ((int64_t)e[2] - a[2]) == ((int64_t)b[2] - a[2]) * ((int64_t)e[1] - a[1]))
         return false;
     pal_sort3(layer, (const int32_t[3]){a[2], b[2], e[2]});
-    if (layer[2] <= 0 || layer[0] >= s->n[2] * (int64_t)PAL_SCAN_ONE) return false;
-    *from = clamp_int(floor(grid_units(layer[0])), 0, s->n[2] - 1);
-    *to = clamp_int(ceil(grid_units(layer[2])) - 1, *from, s->n[2] - 1);
+    if (layer[2] <= 0 || layer[0] >= s->n[2] / s->split * (int64_t)PAL_SCAN_ONE) return false;
+    *from = clamp_int(floor(s->split * grid_units(layer[0])), 0, s->n[2] - 1);
+    *to = clamp_int(ceil(s->split * grid_units(layer[2])) - 1, *from, s->n[2] - 1);
     return true;
 }
 
@@ -120,11 +123,12 @@ static void sort_triangles(const sweep *s)
         if (find_layers(s, t, &from, &to)) s->tri[s->from[from + 1]++] = (int32_t)t;
 }
 
-/* sums the pieces to fractions, in place of own */
+/* sums the pieces to fractions, in place of own; a row that the surface does not meet is outside */
 static void close_layer(const sweep *s)
 {
     size_t n_x = (size_t)s->n[0];
     for (size_t y = 0; y < (size_t)s->n[1]; y++) {
+        if (!s->met[y]) continue;
         double *own = s->own + n_x * y, *pass = s->pass + (n_x + 1) * y, behind = pass[n_x];
         for (size_t x = n_x; x-- > 0;) {
             double fraction = s->sign * (own[x] + behind);
@@ -136,12 +140,17 @@ static void close_layer(const sweep *s)
 
 static void sweep_layers(const sweep *s, pal_fraction_layer take, void *self)
 {
-    size_t n_plane = (size_t)s->n[0] * (size_t)s->n[1];
+    size_t n_x = (size_t)s->n[0];
     int n_live = 0;
     sort_triangles(s);
     for (int z = 0; z < s->n[2]; z++) {
-        memset(s->own, 0, n_plane * sizeof *s->own);
-        memset(s->pass, 0, (n_plane + (size_t)s->n[1]) * sizeof *s->pass);
+        /* what the last layer left */
+        for (size_t y = 0; y < (size_t)s->n[1]; y++) {
+            if (!s->met[y]) continue;
+            s->met[y] = false;
+            memset(s->own + n_x * y, 0, n_x * sizeof *s->own);
+            memset(s->pass + (n_x + 1) * y, 0, (n_x + 1) * sizeof *s->pass);
+        }
         for (int32_t i = s->from[z]; i < s->from[z + 1]; i++) s->live[n_live++] = s->tri[i];
         int n_left = 0;
         for (int i = 0; i < n_live; i++) {
@@ -156,19 +165,21 @@ static void sweep_layers(const sweep *s, pal_fraction_layer take, void *self)
     }
 }
 
-static pal_err fractions_exactly(const pal_scan_surface *scan, const pal_voxels *grid, double sign,
+static pal_err fractions_exactly(const pal_scan_surface *scan, const pal_voxels *grid, int split, double sign,
                                  pal_fraction_layer take, void *self)
 {
-    size_t n_plane = (size_t)grid->n[0] * (size_t)grid->n[1];
-    sweep s = {.scan = scan, .n = grid->n, .sign = sign};
+    const int *n = grid->n;
+    sweep s = {.scan = scan, .split = split, .n = {split * n[0], split * n[1], split * n[2]}, .sign = sign};
+    size_t n_plane = (size_t)s.n[0] * (size_t)s.n[1];
     pal_err err = PAL_ERR_OK;
     PAL_ARRAY(&err, s.tri, scan->n_tri);
     PAL_ARRAY(&err, s.live, scan->n_tri);
-    PAL_ZEROED(&err, s.from, grid->n[2] + 2);
-    PAL_ARRAY(&err, s.own, n_plane);
-    PAL_ARRAY(&err, s.pass, n_plane + (size_t)grid->n[1]);
+    PAL_ZEROED(&err, s.from, s.n[2] + 2);
+    PAL_ZEROED(&err, s.own, n_plane);
+    PAL_ZEROED(&err, s.pass, n_plane + (size_t)s.n[1]);
+    PAL_ZEROED(&err, s.met, s.n[1]);
     if (!err) sweep_layers(&s, take, self);
-    return PAL_FREED(err, s.tri, s.live, s.from, s.own, s.pass);
+    return PAL_FREED(err, s.tri, s.live, s.from, s.own, s.pass, s.met);
 }
 
 /* volume of a closed surface in grid units */
@@ -201,7 +212,7 @@ static pal_err find_plain(const pal_scan_surface *scan, const pal_voxels *grid, 
     return err;
 }
 
-/* counts the set samples of every voxel of layer z */
+/* counts the set samples of every part of layer z */
 static void count_samples(const pal_bits *sample, const int n[3], int n_sub, int z, double *fraction)
 {
     double one = 1.0 / ((double)n_sub * n_sub * n_sub);
@@ -217,12 +228,12 @@ static void count_samples(const pal_bits *sample, const int n[3], int n_sub, int
 }
 
 /* a grid on which the surface is refused (a sheet that encloses few samples) is replaced by a coarser one */
-static pal_err fractions_by_samples(const pal_surface *surface, const pal_voxels *grid, pal_fraction_layer take,
-                                    void *self, pal_diagnostic *diag)
+static pal_err fractions_by_samples(const pal_surface *surface, const pal_voxels *grid, int split,
+                                    pal_fraction_layer take, void *self, pal_diagnostic *diag)
 {
-    const int *n = grid->n;
+    const int n[3] = {split * grid->n[0], split * grid->n[1], split * grid->n[2]};
     double n_cell = (double)n[0] * n[1] * n[2];
-    int n_sub = SUBSAMPLES, longest = n[0] > n[1] ? n[0] : n[1];
+    int n_sub = SUBSAMPLES / split, longest = n[0] > n[1] ? n[0] : n[1];
     longest = n[2] > longest ? n[2] : longest;
     while (n_sub > 1 && (n_sub * longest > MAX_SAMPLE_AXIS || n_cell * pow(n_sub, 3) > MAX_SAMPLE)) n_sub--;
     double *fraction = malloc((size_t)n[0] * (size_t)n[1] * sizeof *fraction);
@@ -230,7 +241,7 @@ static pal_err fractions_by_samples(const pal_surface *surface, const pal_voxels
     for (; err == PAL_ERR_REFUSED && n_sub > 0; n_sub--) {
         pal_voxel_options options = {.resolution = n_sub * longest};
         pal_voxel_report report = {0};
-        pal_voxels fine = {.n = {n_sub * n[0], n_sub * n[1], n_sub * n[2]}, .edge_m = grid->edge_m / n_sub};
+        pal_voxels fine = {.n = {n_sub * n[0], n_sub * n[1], n_sub * n[2]}, .edge_m = grid->edge_m / (n_sub * split)};
         pal_bits sample;
         memcpy(fine.low_m, grid->low_m, sizeof fine.low_m);
         err = pal_bits_create(fine.n, &sample);
@@ -257,8 +268,8 @@ static bool fits(const pal_surface *surface, const pal_voxels *grid)
     return true;
 }
 
-pal_err pal_voxels_fraction(const pal_surface *surface, const pal_voxels *grid, pal_fraction_layer take, void *self,
-                            pal_diagnostic *diag)
+pal_err pal_voxels_fraction(const pal_surface *surface, const pal_voxels *grid, int split, pal_fraction_layer take,
+                            void *self, pal_diagnostic *diag)
 {
     pal_scan_surface scan;
     bool plain = false;
@@ -267,7 +278,7 @@ pal_err pal_voxels_fraction(const pal_surface *surface, const pal_voxels *grid, 
                           grid->edge_m);
     PAL_TRY(pal_scan_snap(surface, grid->low_m, grid->edge_m, &scan));
     pal_err err = find_plain(&scan, grid, &plain);
-    if (!err && plain) err = fractions_exactly(&scan, grid, closed_volume(&scan) < 0 ? -1 : 1, take, self);
+    if (!err && plain) err = fractions_exactly(&scan, grid, split, closed_volume(&scan) < 0 ? -1 : 1, take, self);
     pal_scan_surface_free(&scan);
-    return err || plain ? err : fractions_by_samples(surface, grid, take, self, diag);
+    return err || plain ? err : fractions_by_samples(surface, grid, split, take, self, diag);
 }

@@ -3,7 +3,9 @@
 
 #include "server/base/vec3.h"
 #include "server/num/mass_operator.h"
+#include "server/num/shape_functions.h"
 #include "server/sim/core/sums.h"
+#include "server/sim/core/tuning.h"
 
 #include <math.h>
 #include <string.h>
@@ -91,16 +93,38 @@ double pal_body_element_volume_m3(const pal_body *body, const int32_t *corner)
     return pal_dot3(e, n);
 }
 
+void pal_body_corner_shares(const pal_body *body, int e, double *share)
+{
+    /* shape function of a corner at the Gauss points, by how many axes lead from it to the point's octant */
+    const double near = (1 + sqrt(1.0 / 3)) / 2, far = 1 - near;
+    const double shape[4] = {near * near * near, near * near * far, near * far * far, far * far * far};
+    const int n_corner = body->element ? body->n_corner : 4;
+    const double fill = body->fill ? (double)body->fill[e] : 1;
+    if (body->octants && fill < 1) {
+        double octant[8];
+        pal_hexes_octants(body->hexes, e, PAL_FILL_MIN, octant);
+        for (int c = 0; c < 8; c++) {
+            share[c] = 0;
+            for (int q = 0; q < 8; q++)
+                share[c] += octant[q] * shape[((c ^ q) & 1) + ((c ^ q) >> 1 & 1) + ((c ^ q) >> 2)];
+        }
+        return;
+    }
+    for (int c = 0; c < n_corner; c++)
+        share[c] =
+            fill * (body->own_corner ? pal_body_tet_share(body->own_corner[e], c) : pal_body_corner_share(n_corner, c));
+}
+
 void pal_body_measure_density(const pal_body *body, double *mass_kg, double *volume_m3)
 {
     const bool own = body->element != NULL;
     const int n = own ? body->n_element : body->tets->n_tet, n_corner = own ? body->n_corner : 4;
     for (int e = 0; e < n; e++) {
         const int32_t *corner = (own ? body->element : body->tets->tet) + (size_t)n_corner * (size_t)e;
-        const double filled = pal_body_element_volume_m3(body, corner) * (body->fill ? (double)body->fill[e] : 1);
-        for (int c = 0; c < n_corner; c++)
-            volume_m3[corner[c]] += filled * (body->own_corner ? pal_body_tet_share(body->own_corner[e], c)
-                                                               : pal_body_corner_share(n_corner, c));
+        const double volume = pal_body_element_volume_m3(body, corner);
+        double share[PAL_MAX_CORNERS];
+        pal_body_corner_shares(body, e, share);
+        for (int c = 0; c < n_corner; c++) volume_m3[corner[c]] += volume * share[c];
     }
     for (int i = 0; i < body->n_node; i++) mass_kg[i] += body->node_mass_kg[i];
 }

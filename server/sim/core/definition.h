@@ -73,6 +73,18 @@ enum { PAL_STROKE_MAX = 4096 };
     "liver|gall_bladder|stomach|intestine|kidney|spleen|pancreas|heart|lung|brain|vessel|bone|fat|muscle|skin|plastic"
 enum { PAL_APPEARANCE_BYTES = 16, PAL_COLOUR_BYTES = 8 };
 
+/* Ground that parts of elements stick to, for static problems: the penalty (k/2) int |u - move|^2 dS over surfaces
+ * through voxel hexahedra, which fixes no node. Items ascend by element; move_m may change between steps. */
+typedef struct pal_ground_item {
+    int32_t element, support; /* hexahedron, in which several items may be; whose the surface is */
+    double k_N_m[36];         /* k int N_c N_d dS of its corners c <= d (pal_hex_pair) */
+    double move_m[3];
+} pal_ground_item;
+typedef struct pal_ground {
+    int n;
+    pal_ground_item *item; /* [n] */
+} pal_ground;
+
 typedef struct pal_body_def {
     char name[PAL_NAME];
     char appearance[PAL_APPEARANCE_BYTES]; /* a word of PAL_APPEARANCES; "": unknown */
@@ -99,7 +111,8 @@ typedef struct pal_body_def {
         output; /* "skin_output" (default) or "surface_output"; a body without skin has the latter either way */
     int n_support;
     pal_support_def support[PAL_SUPPORT_MAX];
-    int n_effect; /* gravity, tool_push, tool_grasp, finite_guard, viscous ...         */
+    const pal_ground *ground; /* model fem of hexahedra; NULL: none; borrowed */
+    int n_effect;             /* gravity, tool_push, tool_grasp, finite_guard, viscous ...         */
     pal_config_entry effect[PAL_ENTRIES_MAX];
 } pal_body_def;
 

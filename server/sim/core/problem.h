@@ -34,6 +34,8 @@ typedef struct pal_problem_load {
 
 typedef struct pal_problem_support { /* every point inside is fixed, or displaced by move_m */
     pal_box region;
+    bool has_normal; /* of the body's surface alone, where it faces this way */
+    double normal[3];
     bool moved;
     double move_m[3];
 } pal_problem_support;

@@ -1,22 +1,30 @@
 /* Component hex_elastic: elastic voxel hexahedra, one per voxel of the body (elastic_hex.h).
  *
  * Keys: element ("hex8_bbar": mean dilatation, the default | "hex8": full integration), law ("corotational" |
- * "linear" | "neo_hookean"), fill (true: the stiffness of a voxel is scaled by its fraction inside the surface, at
- * least PAL_FILL_MIN), recover (true: recovery from inversion, recovery/recovery.h; not for linear). */
+ * "linear" | "neo_hookean"), fill (true: voxels that the surface cuts count by what is inside, at least
+ * PAL_FILL_MIN), octants (false: the inside is spread evenly over the voxel; true: by octant),
+ * twist (1: factor on the stiffness of twisting modes, elastic_hex.h), recover (true: recovery from
+ * inversion, recovery/recovery.h; not for linear). */
 #include "server/sim/core/effect_list.h"
 #include "server/sim/elements/elastic_hex.h"
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    pal_hex_options options = {.law = PAL_LAW_COROTATIONAL, .element = PAL_HEX_BBAR, .fill = true, .recover = true};
+    pal_hex_options options = {
+        .law = PAL_LAW_COROTATIONAL, .element = PAL_HEX_BBAR, .fill = true, .recover = true, .twist = 1};
     static const char *const elements[] = {"hex8_bbar", "hex8"};
     int element = 0;
     PAL_TRY(pal_entry_read_choice(item, "element", elements, 2, &element, build->diag));
     if (element) options.element = PAL_HEX_FULL;
     PAL_TRY(pal_elastic_law_read(item, &options.law, build->diag));
     PAL_TRY(pal_entry_read_bool(item, "fill", &options.fill, build->diag));
+    PAL_TRY(pal_entry_read_bool(item, "octants", &options.octants, build->diag));
     PAL_TRY(pal_entry_read_bool(item, "recover", &options.recover, build->diag));
+    PAL_TRY(pal_entry_read_number(item, "twist", 0.01, 1, &options.twist, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
+    if (options.twist < 1 && (element || options.law == PAL_LAW_NEO_HOOKEAN))
+        return PAL_REFUSE(build->diag, "%s.twist: %g is for element hex8_bbar of linear or corotational law",
+                          item->path, options.twist);
     pal_elastic_hexes *hexes = PAL_NEW(build->arena, pal_elastic_hexes, 1);
     if (!hexes) return PAL_ERR_MEMORY;
     *self = hexes;
@@ -36,6 +44,7 @@ static pal_err run(void *self, pal_step *step)
                                                                                   PAL_RUN_FORCE);
         pal_node_order_add(body->node_order, body->f);
     }
+    pal_hex_ground_add(hexes, -1, true, body->d, body->node_rest, body->f);
     pal_recovery_add_forces(hexes->recovery, body);
     return PAL_ERR_OK;
 }
@@ -56,7 +65,8 @@ static double energy(void *self, const pal_body *body)
 {
     pal_elastic_hexes *hexes = self;
     pal_recovery_select(hexes->recovery, body);
-    return elements_energy(hexes, body) + pal_recovery_energy(hexes->recovery, body->d, NULL);
+    return elements_energy(hexes, body) + pal_hex_ground_energy(hexes, body) +
+           pal_recovery_energy(hexes->recovery, body->d, NULL);
 }
 
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
@@ -66,8 +76,8 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
     if (hexes->law == PAL_LAW_NEO_HOOKEAN)
         pal_hex_neo_bound(hexes, body, bound_N_m);
     else
-        for (int i = 0; i < 8 * hexes->n_hex; i++)
-            bound_N_m[hexes->hexes->node[i]] += hexes->bound[hexes->simd_blocks.place[i / 8]];
+        pal_hex_corot_bound(hexes, bound_N_m);
+    pal_hex_ground_bound(hexes, bound_N_m);
     pal_recovery_bound(hexes->recovery, bound_N_m);
 }
 
@@ -118,6 +128,7 @@ static void multiply(void *self, const pal_body *body, double k, const double *p
     else
         pal_hex_corot_multiply(hexes, body->node_order, k);
     pal_node_order_add(body->node_order, out);
+    pal_hex_ground_add(hexes, k, false, p, NULL, out);
     pal_recovery_multiply(hexes->recovery, k, p, out);
 }
 

@@ -1,6 +1,8 @@
 /* Voxel hexahedra: layout, material, assembly. */
 #include "server/sim/elements/elastic_hex.h"
 
+#include "server/sim/elements/tuning.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -55,6 +57,68 @@ static pal_err take_memory(pal_elastic_hexes *cubes, pal_arena *arena)
     return cubes->tangent ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
+void pal_hex_weights(const pal_elastic_hexes *cubes, int lane, double weight[8])
+{
+    const int block = lane / PAL_LANES;
+    for (int q = 0; q < 8; q++)
+        weight[q] = pal_hex_is_cut(cubes, block)
+                        ? cubes->weight[(8 * cubes->cut[block] + q) * PAL_LANES + lane % PAL_LANES]
+                        : 0.125;
+}
+
+/* the weights of an element's points and their sum */
+static double find_weights(const pal_elastic_hexes *cubes, int e, double weight[8])
+{
+    double sum = 0;
+    if (!cubes->fill || !cubes->hexes->fill) return 1;
+    double fill = pal_hexes_octants(cubes->hexes, e, PAL_FILL_MIN, weight);
+    if (!cubes->octants) return fill;
+    for (int q = 0; q < 8; q++) sum += weight[q] = (1 - PAL_VOID_STIFFNESS) * weight[q] + PAL_VOID_STIFFNESS / 8;
+    for (int q = 0; q < 8; q++) weight[q] /= sum;
+    return sum;
+}
+
+/* whole: all weights are equal */
+static bool is_whole(const pal_elastic_hexes *cubes, int e)
+{
+    const float *octant = cubes->fill && cubes->octants ? cubes->hexes->octant + 8 * (size_t)e : NULL;
+    bool equal = true;
+    for (int q = 1; octant && q < 8; q++) equal = equal && octant[q] == octant[0];
+    return equal;
+}
+
+static pal_err make_weights(pal_elastic_hexes *cubes, pal_arena *arena)
+{
+    int n_cut = 0;
+    for (int b = 0; b < cubes->n_block; b++) {
+        bool whole = true;
+        for (int l = 0; l < PAL_LANES; l++) {
+            const int e = cubes->hex[PAL_LANES * b + l];
+            whole = whole && (e < 0 || is_whole(cubes, e));
+        }
+        if (whole) continue;
+        if (n_cut == 0) {
+            cubes->cut = PAL_NEW(arena, int32_t, cubes->n_block);
+            if (!cubes->cut) return PAL_ERR_MEMORY;
+            for (int i = 0; i < cubes->n_block; i++) cubes->cut[i] = -1;
+        }
+        cubes->cut[b] = n_cut++;
+    }
+    if (n_cut == 0) return PAL_ERR_OK;
+    cubes->weight = PAL_NEW(arena, double, 8 * PAL_LANES * (size_t)n_cut);
+    cubes->row = pal_arena_array(arena, PAL_LANES * (size_t)n_cut, sizeof *cubes->row);
+    if (!cubes->weight || !cubes->row) return PAL_ERR_MEMORY;
+    for (int lane = 0; lane < PAL_LANES * cubes->n_block; lane++) {
+        const int cut = cubes->cut[lane / PAL_LANES], l = lane % PAL_LANES;
+        double weight[8] = {0.125, 0.125, 0.125, 0.125, 0.125, 0.125, 0.125, 0.125};
+        if (cut < 0) continue;
+        if (cubes->hex[lane] >= 0 && !is_whole(cubes, cubes->hex[lane])) find_weights(cubes, cubes->hex[lane], weight);
+        for (int q = 0; q < 8; q++) cubes->weight[(8 * cut + q) * PAL_LANES + l] = weight[q];
+    }
+    pal_hex_corot_find_rows(cubes);
+    return PAL_ERR_OK;
+}
+
 pal_err pal_hex_make(const pal_hex_options *options, pal_build *build, const char *path, pal_elastic_hexes *out)
 {
     pal_body *body = build->body;
@@ -63,9 +127,12 @@ pal_err pal_hex_make(const pal_hex_options *options, pal_build *build, const cha
     *out = (pal_elastic_hexes){.law = options->law,
                                .element = options->element,
                                .fill = options->fill,
+                               .octants = options->octants && body->hexes->octant,
                                .recover = options->recover,
+                               .twist = options->twist,
                                .implicit = body->implicit,
                                .hexes = body->hexes,
+                               .ground = body->ground,
                                .n_hex = body->hexes->n_hex,
                                .edge_m = body->tets->edge_m};
     out->beta[0] = options->element == PAL_HEX_BBAR ? -2.0 / 3 : 0;
@@ -85,11 +152,12 @@ pal_err pal_hex_make(const pal_hex_options *options, pal_build *build, const cha
     for (int i = 0; i < out->simd_blocks.n_lane; i++) out->hex[i] = -1;
     for (int e = 0; e < out->n_hex; e++) {
         int lane = out->simd_blocks.place[e];
-        bool filled = !out->fill || !out->hexes->fill;
+        double weight[8];
         out->hex[lane] = e;
-        out->share[lane] = filled ? 1 : fmax(PAL_FILL_MIN, fmin(1, (double)out->hexes->fill[e]));
+        out->share[lane] = find_weights(out, e, weight);
     }
     pal_hex_fill_reference(out);
+    PAL_TRY(make_weights(out, build->arena));
     if (options->recover && options->law != PAL_LAW_LINEAR) PAL_TRY(pal_hex_recovery_make(out, build));
     pal_hex_material(out, &build->def->material);
     pal_hex_reset(out);
@@ -135,6 +203,7 @@ void pal_hex_assemble(pal_elastic_hexes *cubes, double k, pal_block_matrix *to)
             if (e >= 0) add_entries(cubes->entry + 36 * e, part + l, to->value);
         }
     }
+    pal_hex_ground_assemble(cubes, k, to);
 }
 
 typedef struct rotation_sum {

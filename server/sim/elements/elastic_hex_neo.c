@@ -10,7 +10,8 @@
  * j), a = U / (4 h), so that sums over the points are Walsh transforms over their signs, and K of a cube is made from
  * the transform of the points' Hessians: K_(i,m)(k,n) = V sum_{j in m, l in n} H_ij,kl^ (m without j XOR n without l)
  * g^(|m| + |n| - 2) with g = 1/sqrt 3, where an axis in both exponents gives 1. 21 unknowns (translations are left
- * out), 231 numbers. */
+ * out), 231 numbers. The points of cut voxels have weights (elastic_hex.h) in the means and in the sums. */
+#include "server/base/vec3.h"
 #include "server/sim/elements/elastic_hex_simd.h"
 
 /* mu, k1 and kappa of the mean dilatation, times share and h / 16 */
@@ -24,78 +25,63 @@ PAL_INLINE void load_neo(const pal_elastic_hexes *cubes, int block, int l, pal_w
         *k1 = lambda + *mu, *kappa = pal_wide_of(0);
 }
 
-/* F at the Gauss points from the modes; point p at the signs of its bits */
-PAL_INLINE void gauss_gradients(double scale, pal_wide u[3][8], pal_wide f[8][9])
+/* 8 times the weights of the points of a block with cut voxels */
+PAL_INLINE void load_weights(const pal_elastic_hexes *cubes, int block, int l, pal_wide weight[8])
 {
-    const double gauss = sqrt(1.0 / 3);
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            const int self = 1 << j, a = 1 << (j + 1) % 3, b = 1 << (j + 2) % 3;
-            pal_wide c0 = scale * u[i][self], ca = (gauss * scale) * u[i][self | a];
-            pal_wide cb = (gauss * scale) * u[i][self | b], cab = (gauss * gauss * scale) * u[i][7];
-            pal_wide low = c0 - ca, high = c0 + ca, low_b = cb - cab, high_b = cb + cab;
-            f[0][3 * i + j] = f[self][3 * i + j] = low - low_b;
-            f[a][3 * i + j] = f[a | self][3 * i + j] = high - high_b;
-            f[b][3 * i + j] = f[b | self][3 * i + j] = low + low_b;
-            f[a | b][3 * i + j] = f[7][3 * i + j] = high + high_b;
-        }
+    pal_wide_load_n(cubes->weight + 8 * PAL_LANES * cubes->cut[block] + l, 8, weight);
+    for (int p = 0; p < 8; p++) weight[p] *= 8;
 }
 
-/* the transposed: sums over the points of p_ij times the modes' gradients, modes 1..7 */
-PAL_INLINE void gauss_sums(double scale, pal_wide p[8][9], pal_wide u[3][8])
-{
-    const double gauss = sqrt(1.0 / 3);
-    for (int i = 0; i < 3; i++) {
-        for (int m = 0; m < 8; m++) u[i][m] = pal_wide_of(0);
-        for (int j = 0; j < 3; j++) {
-            const int self = 1 << j, a = 1 << (j + 1) % 3, b = 1 << (j + 2) % 3, ij = 3 * i + j;
-            pal_wide s0 = p[0][ij] + p[self][ij], sa = p[a][ij] + p[a | self][ij];
-            pal_wide sb = p[b][ij] + p[b | self][ij], sab = p[a | b][ij] + p[7][ij];
-            pal_wide low = s0 + sa, high = sb + sab, low_a = sa - s0, high_a = sab - sb;
-            u[i][self] += scale * (low + high);
-            u[i][self | a] += (gauss * scale) * (low_a + high_a);
-            u[i][self | b] += (gauss * scale) * (high - low);
-            u[i][7] += (gauss * gauss * scale) * (high_a - low_a);
-        }
-    }
-}
-
-/* volume now over that at rest, - 1 */
-PAL_INLINE pal_wide mean_dilatation(pal_wide f[8][9])
+/* volume now over that at rest, - 1; weight: times 8, NULL: 1 */
+PAL_INLINE pal_wide mean_dilatation(const pal_wide *weight, pal_wide f[8][9])
 {
     pal_wide sum = pal_wide_of(-8), c[9];
-    for (int p = 0; p < 8; p++) sum += pal_wide_cofactors(f[p], c);
+    for (int p = 0; p < 8; p++) sum += weight ? weight[p] * pal_wide_cofactors(f[p], c) : pal_wide_cofactors(f[p], c);
     return 0.125 * sum;
+}
+
+/* of one block: forces are added, the energy of each lane is returned over 16 h^2 */
+PAL_INLINE pal_wide run_block(const pal_elastic_hexes *cubes, pal_node_order *node_order, int b, bool cut,
+                              pal_element_run what)
+{
+    pal_wide sum = {0};
+    pal_block_view v;
+    pal_block_open(&cubes->simd_blocks, node_order, b, 8, &v);
+    for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
+        pal_wide u[3][8], f[8][9], c[9], mu, k1, kappa, weight[8], e = {0};
+        load_neo(cubes, b, l, &mu, &k1, &kappa);
+        if (cut) load_weights(cubes, b, l, weight);
+        hex_modes(&v, l, u);
+        hex_gradients(1 / (4 * cubes->edge_m), u, f);
+        pal_wide mean = mean_dilatation(cut ? weight : NULL, f), pressure = kappa * mean - mu - k1;
+        for (int p = 0; p < 8; p++) {
+            pal_wide det = pal_wide_cofactors(f[p], c), j1 = det - 1, square = pal_wide_of(-3), t = det * k1 + pressure,
+                     scale = mu, energy;
+            for (int i = 0; i < 9 && (what & PAL_RUN_ENERGY); i++) square += f[p][i] * f[p][i];
+            if (what & PAL_RUN_ENERGY) {
+                energy = 0.5 * mu * square - mu * j1 + 0.5 * k1 * j1 * j1;
+                e += cut ? weight[p] * energy : energy;
+            }
+            if (cut) scale *= weight[p], t *= weight[p];
+            for (int i = 0; i < 9 && (what & PAL_RUN_FORCE); i++) f[p][i] = scale * f[p][i] + t * c[i];
+        }
+        e = 0.125 * e + 0.5 * kappa * mean * mean;
+        if (what & PAL_RUN_ENERGY) sum += pal_wide_select(mu > 0, e, pal_wide_of(0));
+        if (!(what & PAL_RUN_FORCE)) continue;
+        hex_sums(-0.5 * cubes->edge_m, f, u);
+        hex_add(&v, l, u);
+    }
+    if (what & PAL_RUN_FORCE) pal_block_close(&cubes->simd_blocks, node_order, b, 8, &v);
+    return sum;
 }
 
 /* forces are added, the energy is returned */
 PAL_INLINE double all_blocks(const pal_elastic_hexes *cubes, pal_node_order *node_order, pal_element_run what)
 {
     pal_wide sum = {0};
-    for (int b = 0; b < cubes->n_block; b++) {
-        pal_block_view v;
-        pal_block_open(&cubes->simd_blocks, node_order, b, 8, &v);
-        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
-            pal_wide u[3][8], f[8][9], c[9], mu, k1, kappa, e = {0};
-            load_neo(cubes, b, l, &mu, &k1, &kappa);
-            hex_modes(&v, l, u);
-            gauss_gradients(1 / (4 * cubes->edge_m), u, f);
-            pal_wide mean = mean_dilatation(f), pressure = kappa * mean - mu - k1;
-            for (int p = 0; p < 8; p++) {
-                pal_wide det = pal_wide_cofactors(f[p], c), j1 = det - 1, square = pal_wide_of(-3),
-                         t = det * k1 + pressure;
-                for (int i = 0; i < 9 && (what & PAL_RUN_ENERGY); i++) square += f[p][i] * f[p][i];
-                if (what & PAL_RUN_ENERGY) e += 0.5 * mu * square - mu * j1 + 0.5 * k1 * j1 * j1;
-                for (int i = 0; i < 9 && (what & PAL_RUN_FORCE); i++) f[p][i] = mu * f[p][i] + t * c[i];
-            }
-            e = 0.125 * e + 0.5 * kappa * mean * mean;
-            if (what & PAL_RUN_ENERGY) sum += pal_wide_select(mu > 0, e, pal_wide_of(0));
-            if (!(what & PAL_RUN_FORCE)) continue;
-            gauss_sums(-0.5 * cubes->edge_m, f, u);
-            hex_add(&v, l, u);
-        }
-        if (what & PAL_RUN_FORCE) pal_block_close(&cubes->simd_blocks, node_order, b, 8, &v);
-    }
+    for (int b = 0; b < cubes->n_block; b++)
+        sum += pal_hex_is_cut(cubes, b) ? run_block(cubes, node_order, b, true, what)
+                                        : run_block(cubes, node_order, b, false, what);
     double all = 0;
     for (int l = 0; l < PAL_WIDE; l++) all += sum[l];
     return 16 * cubes->edge_m * cubes->edge_m * all;
@@ -226,17 +212,20 @@ PAL_INLINE void point_hessian(pal_wide mu, pal_wide c, pal_wide k1, const pal_wi
 static void all_hessians(const pal_elastic_hexes *cubes, int block, int l, const pal_wide q0[4], pal_wide f[8][9],
                          pal_wide h[45][8], pal_wide mean[3][8])
 {
-    pal_wide mu, k1, kappa, g[8][9], q[4], r[9], m[9], one[45];
+    const bool cut = pal_hex_is_cut(cubes, block);
+    pal_wide mu, k1, kappa, g[8][9], q[4], r[9], m[9], one[45], weight[8];
     load_neo(cubes, block, l, &mu, &k1, &kappa);
-    pal_wide pressure = kappa * mean_dilatation(f) - mu - k1;
+    if (cut) load_weights(cubes, block, l, weight);
+    pal_wide pressure = kappa * mean_dilatation(cut ? weight : NULL, f) - mu - k1;
     for (int p = 0; p < 8; p++) {
         pal_wide c = pal_wide_cofactors(f[p], g[p]) * k1 + pressure;
         memcpy(q, q0, sizeof q);
         pal_wide_polar(f[p], mu > 0, q, r, m);
         point_hessian(mu, c, k1, f[p], g[p], r, one);
-        for (int i = 0; i < 45; i++) h[i][p] = one[i];
+        for (int i = 0; i < 45; i++) h[i][p] = cut ? weight[p] * one[i] : one[i];
+        for (int i = 0; i < 9 && cut; i++) g[p][i] *= weight[p];
     }
-    gauss_sums(0.125, g, mean);
+    hex_sums(0.125, g, mean);
 }
 
 void pal_hex_neo_linearise(pal_elastic_hexes *cubes, pal_node_order *node_order)
@@ -250,7 +239,7 @@ void pal_hex_neo_linearise(pal_elastic_hexes *cubes, pal_node_order *node_order)
             hex_turn_block(cubes, b, l, u, r);
             pal_wide_store_n(cubes->rotation + 9 * b * PAL_LANES + l, 9, r);
             pal_wide_load_n(cubes->q + 4 * b * PAL_LANES + l, 4, q);
-            gauss_gradients(1 / (4 * cubes->edge_m), u, f);
+            hex_gradients(1 / (4 * cubes->edge_m), u, f);
             load_neo(cubes, b, l, &mu, &k1, &kappa);
             /* lanes without an element may read anything */
             for (int i = 0; i < 72; i++)
@@ -318,40 +307,74 @@ void pal_hex_neo_blocks(const pal_elastic_hexes *cubes, int block, double k, dou
 
 /* The largest eigenvalue of a cube's K is at most that of V/8 sum B'B, h / 2, times the largest |H| of its points, and
  * what the mean's rank one adds, kappa V |grad Jm|^2. |H| <= mu + 2/sqrt 3 |c| |F| + k1 |dJ/dF|^2, c the factor of
- * d2J/dF2 */
-static double largest_eigenvalue(const pal_elastic_hexes *cubes, int lane, double f[8][9], double grad[8][8][3])
+ * d2J/dF2. The corners of a cut cube differ too much for one number: the sum of |K| over a corner's row is at most
+ * V sum p_q |H_q| |grad N_c| sum_d |grad N_d|, and kappa V |grad_c Jm| sum_d |grad_d Jm| */
+typedef struct bounds {
+    const double (*grad)[8][3]; /* of the shape functions at the points, times h / 2 */
+    double weight[8];           /* of the points, sum 1 */
+    double hessian[8];          /* |H| of the points    */
+    double mean[24], kappa;     /* grad Jm times h / 2  */
+} bounds;
+
+static void find_bounds(const pal_elastic_hexes *cubes, int lane, double f[8][9], bounds *b)
 {
     const double mu = cubes->mu[lane], lambda = cubes->lambda[lane];
     const bool bbar = cubes->element == PAL_HEX_BBAR;
-    const double k1 = bbar ? mu / 3 : lambda + mu, kappa = bbar ? lambda + 2 * mu / 3 : 0;
-    double cof[8][9], mean[24] = {0}, dilatation = -1, max = 0, square = 0;
+    const double k1 = bbar ? mu / 3 : lambda + mu;
+    double cof[8][9], dilatation = -1;
+    b->kappa = bbar ? lambda + 2 * mu / 3 : 0;
+    pal_hex_weights(cubes, lane, b->weight);
+    memset(b->mean, 0, sizeof b->mean);
     for (int p = 0; p < 8; p++) {
         pal_cofactor3(f[p], cof[p]);
-        dilatation += pal_det3(f[p]) / 8;
-        for (int i = 0; i < 72; i++) mean[i / 3] += cof[p][i / 3 % 3 * 3 + i % 3] * grad[p][i / 9][i % 3] / 8;
+        dilatation += b->weight[p] * pal_det3(f[p]);
+        for (int i = 0; i < 72; i++)
+            b->mean[i / 3] += b->weight[p] * cof[p][i / 3 % 3 * 3 + i % 3] * b->grad[p][i / 9][i % 3];
     }
-    for (int i = 0; i < 24; i++) square += mean[i] * mean[i];
     for (int p = 0; p < 8; p++) {
-        double f2 = 0, c2 = 0, c = -mu + k1 * (pal_det3(f[p]) - 1) + kappa * dilatation;
+        double f2 = 0, c2 = 0, c = -mu + k1 * (pal_det3(f[p]) - 1) + b->kappa * dilatation;
         for (int i = 0; i < 9; i++) f2 += f[p][i] * f[p][i], c2 += cof[p][i] * cof[p][i];
-        max = fmax(max, mu + 2 / sqrt(3) * fabs(c) * sqrt(f2) + k1 * c2);
+        b->hessian[p] = mu + 2 / sqrt(3) * fabs(c) * sqrt(f2) + k1 * c2;
     }
-    /* the constants have h / 16, gradients here lack 2 / h */
-    return 8 * max + 64 * kappa * square;
+}
+
+/* the constants have h / 16, gradients here lack 2 / h */
+static double largest_eigenvalue(const bounds *b)
+{
+    double max = 0, square = 0;
+    for (int i = 0; i < 24; i++) square += b->mean[i] * b->mean[i];
+    for (int p = 0; p < 8; p++) max = fmax(max, b->hessian[p]);
+    return 8 * max + 64 * b->kappa * square;
+}
+
+static double row_of(const bounds *b, int corner)
+{
+    double sum = 0, all = 0;
+    for (int p = 0; p < 8; p++) {
+        double rest = 0;
+        for (int c = 0; c < 8; c++) rest += pal_norm3(b->grad[p][c]);
+        sum += b->weight[p] * b->hessian[p] * pal_norm3(b->grad[p][corner]) * rest;
+    }
+    for (int c = 0; c < 8; c++) all += pal_norm3(b->mean + 3 * c);
+    return 64 * (sum + b->kappa * pal_norm3(b->mean + 3 * corner) * all);
 }
 
 void pal_hex_neo_bound(pal_elastic_hexes *cubes, const pal_body *body, double *bound_N_m)
 {
     double grad[8][8][3];
+    bounds b = {.grad = (const double(*)[8][3])grad};
     for (int p = 0; p < 8; p++) pal_hex_shape(pal_hex_gauss[p], NULL, grad[p]);
     for (int e = 0; e < cubes->n_hex; e++) {
         const int32_t *node = cubes->hexes->node + 8 * e;
+        const int lane = cubes->simd_blocks.place[e];
         double f[8][9] = {{0}};
         for (int p = 0; p < 8; p++)
             for (int c = 0; c < 8; c++)
                 for (int i = 0; i < 9; i++)
                     f[p][i] += 2 / cubes->edge_m * body->d[3 * node[c] + i / 3] * grad[p][c][i % 3];
-        double max = largest_eigenvalue(cubes, cubes->simd_blocks.place[e], f, grad);
-        for (int c = 0; c < 8; c++) bound_N_m[node[c]] += max;
+        find_bounds(cubes, lane, f, &b);
+        const double max = largest_eigenvalue(&b);
+        const bool cut = pal_hex_is_cut(cubes, lane / PAL_LANES);
+        for (int c = 0; c < 8; c++) bound_N_m[node[c]] += cut ? row_of(&b, c) : max;
     }
 }

@@ -24,9 +24,14 @@ pal_err pal_hex_single_make(const pal_elastic_hexes *cubes, const pal_body *body
                             pal_elastic_hexes_single *out)
 {
     const size_t n = PAL_LANES * (size_t)cubes->n_block;
-    *out = (pal_elastic_hexes_single){.cubes = cubes, .n_slot = body->node_order->n_slot};
+    *out =
+        (pal_elastic_hexes_single){.cubes = cubes, .n_slot = body->node_order->n_slot, .slot = body->node_order->slot};
     out->stiff = PAL_NEW(arena, float, 2 * n);
     if (cubes->law != PAL_LAW_LINEAR) out->rotation = PAL_NEW(arena, float, 9 * n);
+    int n_cut = 0;
+    for (int b = 0; cubes->cut && b < cubes->n_block; b++) n_cut = cubes->cut[b] >= n_cut ? cubes->cut[b] + 1 : n_cut;
+    if (n_cut > 0 && !(out->weight = PAL_NEW(arena, float, 8 * PAL_LANES * (size_t)n_cut))) return PAL_ERR_MEMORY;
+    for (int i = 0; i < 8 * PAL_LANES * n_cut; i++) out->weight[i] = (float)cubes->weight[i];
     return out->stiff && (out->rotation || cubes->law == PAL_LAW_LINEAR) ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
@@ -109,18 +114,41 @@ PAL_INLINE single_wide load_own(const float *from, const int32_t block[BLOCKS], 
     return load(at);
 }
 
+/* the weights of the points of the blocks, of which one at least has cut elements */
+PAL_INLINE void load_weights(const pal_elastic_hexes_single *single, const int32_t block[BLOCKS], single_wide p[8])
+{
+    static const float even[PAL_LANES] = {0.125F, 0.125F, 0.125F, 0.125F, 0.125F, 0.125F, 0.125F, 0.125F};
+    for (int q = 0; q < 8; q++) {
+        const float *at[BLOCKS];
+        for (int k = 0; k < BLOCKS; k++) {
+            const int cut = single->cubes->cut[block[k]];
+            at[k] = cut < 0 ? even : single->weight + (8 * cut + q) * PAL_LANES;
+        }
+        p[q] = load(at);
+    }
+}
+
 /* u becomes k K u of the elements of the blocks */
 PAL_INLINE void multiply_blocks(const product *to, const int32_t block[BLOCKS], bool turned, single_wide u[3][8])
 {
     const pal_elastic_hexes_single *single = to->single;
-    const float beta[2] = {(float)single->cubes->beta[0], (float)single->cubes->beta[1]};
+    const float beta[2] = {(float)single->cubes->beta[0], (float)single->cubes->beta[1]},
+                twist = (float)single->cubes->twist;
     const single_wide mu = to->k * load_own(single->stiff, block, 2, 0),
                       lambda = to->k * load_own(single->stiff, block, 2, 1);
     single_wide r[9];
     for (int i = 0; i < 3; i++) walsh(u[i]);
     for (int i = 0; i < 9 && turned; i++) r[i] = load_own(single->rotation, block, 9, i);
     if (turned) turn(r, true, u);
-    hex_stress(mu, lambda, beta[0] * mu + beta[1] * lambda, u);
+    bool cut = false;
+    for (int k = 0; k < BLOCKS; k++) cut = cut || pal_hex_is_cut(single->cubes, block[k]);
+    if (cut) {
+        single_wide p[8];
+        load_weights(single, block, p);
+        hex_cut_stress(mu, lambda, beta[0] * mu + beta[1] * lambda, twist, p, u);
+    } else {
+        hex_stress(mu, lambda, beta[0] * mu + beta[1] * lambda, twist, u);
+    }
     if (turned) turn(r, false, u);
     for (int i = 0; i < 3; i++) unwalsh(u[i]);
 }
@@ -177,11 +205,29 @@ static void multiply_part(void *user, int part)
     }
 }
 
+static void add_ground(const product *to)
+{
+    const pal_elastic_hexes *cubes = to->single->cubes;
+    const pal_ground *ground = cubes->ground;
+    const size_t n_slot = (size_t)to->single->n_slot;
+    for (int i = 0; ground && i < ground->n; i++) {
+        const int32_t *node = cubes->hexes->node + 8 * (size_t)ground->item[i].element;
+        for (int p = 0; p < 64; p++) {
+            const int c = p / 8, d = p % 8, low = c <= d ? c : d, high = c <= d ? d : c;
+            const float k = to->k * (float)ground->item[i].k_N_m[pal_hex_pair(low, high)];
+            for (size_t j = 0; j < 3; j++)
+                to->out[j * n_slot + (size_t)to->single->slot[node[c]]] +=
+                    k * to->p[j * n_slot + (size_t)to->single->slot[node[d]]];
+        }
+    }
+}
+
 void pal_hex_single_multiply(const pal_elastic_hexes_single *single, pal_team *team, float k, const float *p,
                              float *out)
 {
     product job = {.single = single, .k = k, .p = p, .out = out};
     pal_block_rounds_run(&single->cubes->rounds, team, multiply_part, &job);
+    add_ground(&job);
 }
 
 /* to = R k R', one block of 3x3 */
@@ -200,16 +246,16 @@ void pal_hex_single_element(const pal_elastic_hexes_single *single, const float 
 {
     const int place = single->cubes->simd_blocks.place[e], block = place / PAL_LANES, lane = place % PAL_LANES;
     const float *stiff = single->stiff + 2 * PAL_LANES * block + lane;
-    double r[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, trace;
+    double r[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, part[36][9], trace;
+    pal_hex_matrix(single->cubes, place, (double)stiff[0], (double)stiff[PAL_LANES], part);
     for (int i = 0; i < 9 && rotation; i++) r[i] = (double)rotation[(9 * block + i) * PAL_LANES + lane];
     trace = r[0] + r[4] + r[8];
     for (int c = 0; c < 8; c++)
         for (int d = c; d < 8; d++) {
-            const double *part = single->cubes->reference[pal_hex_pair(c, d)][0];
-            double a[9];
-            for (int i = 0; i < 9; i++)
-                a[i] = k * ((double)stiff[0] * part[i] + (double)stiff[PAL_LANES] * part[9 + i]);
+            double *a = part[pal_hex_pair(c, d)];
+            for (int i = 0; i < 9; i++) a[i] *= k;
             if (trace < 3) turn_block(r, a, a);
             for (int i = 0; i < 9; i++) to[3 * c + i / 3][3 * d + i % 3] = to[3 * d + i % 3][3 * c + i / 3] = a[i];
         }
+    pal_hex_ground_block(single->cubes, e, k, to);
 }

@@ -9,7 +9,9 @@
 typedef struct pal_elastic_hexes_single {
     const pal_elastic_hexes *cubes;
     int n_slot;
-    float *stiff;    /* mu, lambda times h / 16, N/m                   [n_block][2][8] */
+    const int32_t *slot; /* of the body's nodes [n_node] */
+    float *stiff;        /* mu, lambda times h / 16, N/m                   [n_block][2][8] */
+    float *weight;   /* as in cubes: of blocks with a cut element [blocks that are cut][8][8]; NULL: there are none */
     float *rotation; /* [n_block][9][8]; NULL: the law is linear */
 } pal_elastic_hexes_single;
 

@@ -6,4 +6,7 @@
 
 /* volume over h^3 of a tetrahedron that is a sliver (tests/stability/test_fem_numbers.c) */
 #define PAL_TET_SLIVER (1e-3 / 6)
+/* stiffness of what lies outside of the surface in a cut voxel, over that inside: no point is without any, and the
+ * condition number of the stiffness stays that of whole voxels (tests/sim/elements/test_hex_cut.c) */
+#define PAL_VOID_STIFFNESS 1e-3
 #endif

@@ -314,19 +314,20 @@ double pal_system_energy(const pal_system *system)
 
 /* ---- supports ---- */
 
-/* the fixed nodes of one part span a plane: three of them off a line. first, far: -1 as long as there is none */
+/* the fixed nodes of one part, and those of elements that stick to ground, span a plane: three of them off a line.
+ * first, far: -1 as long as there is none */
 typedef struct span {
     int32_t first, far;
     double far_m, off_m; /* from first; from the line through first and far */
 } span;
 
-static void count_parts(const pal_body *body, int32_t *parent, span *s, pal_support_report *out)
+static void count_parts(const pal_body *body, const uint8_t *held, int32_t *parent, span *s, pal_support_report *out)
 {
     int n = body->n_dof;
     *out = (pal_support_report){.unsupported_node = -1};
     for (int i = 0; i < n; i++) s[i] = (span){.first = -1, .far = -1};
     for (int i = 0; i < n; i++)
-        if (body->support[i]) {
+        if (held[i]) {
             span *t = &s[pal_union_find_root(parent, i)];
             if (t->first < 0) t->first = i;
             double distance = pal_dist3(body->x_rest + 3 * t->first, body->x_rest + 3 * i);
@@ -335,7 +336,7 @@ static void count_parts(const pal_body *body, int32_t *parent, span *s, pal_supp
     for (int i = 0; i < n; i++) {
         span *t = &s[pal_union_find_root(parent, i)];
         double area2[3]; /* of the triangle first, far, i */
-        if (!body->support[i] || t->far < 0) continue;
+        if (!held[i] || t->far < 0) continue;
         pal_normal3(area2, body->x_rest + 3 * t->first, body->x_rest + 3 * t->far, body->x_rest + 3 * i);
         t->off_m = fmax(t->off_m, pal_norm3(area2) / t->far_m);
     }
@@ -343,10 +344,17 @@ static void count_parts(const pal_body *body, int32_t *parent, span *s, pal_supp
         if (parent[i] != i) continue;
         out->n_part++;
         /* a part of one node is held as soon as that node is */
-        if (s[i].off_m > 1e-9 * body->length_scale_m || (body->support[i] && s[i].far < 0)) continue;
+        if (s[i].off_m > 1e-9 * body->length_scale_m || (held[i] && s[i].far < 0)) continue;
         out->n_unsupported++;
         if (out->unsupported_node < 0) out->unsupported_node = i;
     }
+}
+
+static void mark_held(const pal_body *body, uint8_t *held)
+{
+    memcpy(held, body->support, (size_t)body->n_dof);
+    for (int k = 0; body->ground && k < body->ground->n; k++)
+        for (int c = 0; c < 8; c++) held[body->hexes->node[8 * body->ground->item[k].element + c]] = 1;
 }
 
 pal_err pal_system_find_supports(const pal_system *system, pal_support_report *out)
@@ -356,8 +364,10 @@ pal_err pal_system_find_supports(const pal_system *system, pal_support_report *o
     const pal_block_matrix *a = system->interpolated_system ? &system->interpolated_system->rest : NULL;
     int32_t *parent = malloc(sizeof *parent * (size_t)n);
     span *s = malloc(sizeof *s * (size_t)n);
-    bool all = list && parent && s;
+    uint8_t *held = malloc((size_t)n);
+    bool all = list && parent && s && held;
     if (all) {
+        mark_held(system->body, held);
         for (int32_t i = 0; i < n; i++) parent[i] = i;
         for (int l = 0; l < n_list && !a; l++)
             for (int e = 0; e < list[l].n_item; e++) {
@@ -367,8 +377,8 @@ pal_err pal_system_find_supports(const pal_system *system, pal_support_report *o
         for (int32_t j = 0; a && j < n; j++)
             for (int32_t k = a->start[j]; k < a->start[j + 1]; k++)
                 parent[pal_union_find_root(parent, a->row[k])] = pal_union_find_root(parent, j);
-        count_parts(system->body, parent, s, out);
+        count_parts(system->body, held, parent, s, out);
     }
-    free(list), free(parent), free(s);
+    free(list), free(parent), free(s), free(held);
     return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }

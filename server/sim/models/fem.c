@@ -1,14 +1,15 @@
 /* Model fem: linear or quadratic tetrahedra, or one hexahedron per voxel, on the nodes of a prepared mesh.
  *
  * Keys: element ("hex8_bbar" | "hex8" | "tet4" | "tet10"; hex8_bbar where the prepared mesh has hexahedra, else tet4),
- * law ("corotational" | "linear" | "neo_hookean"), fill (true: mass and stiffness of a voxel that the surface cuts are
- * scaled by its filled share, at least PAL_FILL_MIN).
+ * law ("corotational" | "linear" | "neo_hookean"), fill (true: a voxel that the surface cuts has mass and stiffness by
+ * its share inside, at least PAL_FILL_MIN), octants, twist (hexahedra: as hex_elastic's).
  *
  * Components: hex_elastic or tet_elastic with the same keys, viscous where the material has damping, solver
  * implicit_euler. Under static_newton a neo_hookean body has no recovery, because the edges of a region are another
  * material: a corner inverted at a clamped edge is part of the discrete rest state. Masses are lumped: equal shares to
- * the corners; tet10 by Hinton, Rock and Zienkiewicz (1976), 1/36 of an element to a corner and 4/27 to a middle node,
- * which are all positive. tet10 has its middle nodes behind the mesh's own, whose numbers (skin, supports) stay true.
+ * the corners, with octants by the shape functions at their Gauss points; tet10 by Hinton, Rock and
+ * Zienkiewicz (1976), 1/36 of an element to a corner and 4/27 to a middle node, which are all positive. tet10 has its
+ * middle nodes behind the mesh's own, whose numbers (skin, supports) stay true.
  */
 #include "server/base/vec3.h"
 #include "server/num/shape_functions.h"
@@ -20,7 +21,8 @@
 
 typedef struct fem_choice {
     const char *element, *law; /* law NULL: the row's default */
-    bool fill, hex;
+    bool fill, octants, hex;
+    double twist; /* NaN: the row's default */
     int n_corner;
 } fem_choice;
 
@@ -30,10 +32,12 @@ static pal_err read_keys(pal_config_entry *item, const pal_build *build, fem_cho
     static const int corners[] = {8, 8, 4, 10};
     const pal_prepared *mesh = build->def->mesh;
     int kind = mesh->hexes.n_hex > 0 ? 0 : 2;
-    *to = (fem_choice){.fill = true};
+    *to = (fem_choice){.fill = true, .twist = NAN};
     PAL_TRY(pal_entry_read_choice(item, "element", names, 4, &kind, build->diag));
     PAL_TRY(pal_entry_read_text(item, "law", &to->law, build->diag));
     PAL_TRY(pal_entry_read_bool(item, "fill", &to->fill, build->diag));
+    PAL_TRY(pal_entry_read_bool(item, "octants", &to->octants, build->diag));
+    PAL_TRY(pal_entry_read_number(item, "twist", 0.01, 1, &to->twist, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     to->element = names[kind], to->n_corner = corners[kind];
     to->hex = to->n_corner == 8;
@@ -55,6 +59,8 @@ static pal_err list(pal_config_entry *item, pal_build *build, pal_component_list
     PAL_TRY(pal_entry_put_text(row, "element", k.element, build->diag));
     if (k.law) PAL_TRY(pal_entry_put_text(row, "law", k.law, build->diag));
     PAL_TRY(pal_entry_put_bool(row, "fill", k.fill, build->diag));
+    if (k.hex && k.octants) PAL_TRY(pal_entry_put_bool(row, "octants", true, build->diag));
+    if (k.hex && !isnan(k.twist)) PAL_TRY(pal_entry_put_number(row, "twist", k.twist, build->diag));
     const bool own_law = k.law && !strcmp(k.law, "neo_hookean") && !strcmp(build->def->solver.name, "static_newton");
     if (own_law) PAL_TRY(pal_entry_put_bool(row, "recover", false, build->diag));
     if (build->def->material.damping_1_s != 0) pal_entry_init(++row, item->path, "viscous");
@@ -145,6 +151,7 @@ static pal_err make_fill(const pal_build *build, const fem_choice *choice)
     for (int e = 0; e < body->n_element; e++)
         fill[e] = fmaxf(mesh->hexes.fill[choice->hex ? e : e / 5], (float)PAL_FILL_MIN);
     body->fill = fill;
+    body->octants = choice->hex && choice->octants && mesh->hexes.octant;
     return PAL_ERR_OK;
 }
 
@@ -158,9 +165,9 @@ static pal_err lump_mass(const pal_build *build)
         pal_material material;
         for (int c = 0; c < n_mean; c++) pal_axpy3(centre, 1.0 / n_mean, body->x_rest + 3 * node[c]);
         pal_material_at(build->def, centre, &material);
-        double mass =
-            material.density_kg_m3 * pal_body_element_volume_m3(body, node) * (body->fill ? (double)body->fill[e] : 1);
-        for (int c = 0; c < n_corner; c++) body->mass_kg[node[c]] += mass * pal_body_corner_share(n_corner, c);
+        double mass = material.density_kg_m3 * pal_body_element_volume_m3(body, node), share[PAL_MAX_CORNERS];
+        pal_body_corner_shares(body, e, share);
+        for (int c = 0; c < n_corner; c++) body->mass_kg[node[c]] += mass * share[c];
     }
     for (int i = 0; i < body->n_node; i++)
         if (!(body->mass_kg[i] > 0))
@@ -176,10 +183,11 @@ static pal_err build(pal_config_entry *item, pal_build *build, pal_component_lis
     PAL_TRY(read_keys(item, build, &choice));
     PAL_TRY(list(item, build, out));
     PAL_TRY(make_nodes(build, &choice));
-    PAL_TRY(make_fill(build, &choice));
-    PAL_TRY(lump_mass(build));
     body->tets = &mesh->tets;
     body->hexes = mesh->hexes.n_hex > 0 ? &mesh->hexes : NULL;
+    if (choice.hex) body->ground = build->def->ground;
+    PAL_TRY(make_fill(build, &choice));
+    PAL_TRY(lump_mass(build));
     body->display.surface = &mesh->surface;
     body->display.skin = mesh->skin.n_vertex > 0 ? &mesh->skin : NULL;
     body->edge_m = mesh->tets.edge_m;

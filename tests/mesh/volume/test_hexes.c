@@ -90,6 +90,59 @@ static void order_within_a_voxel_does_not_matter_but_the_cube_does(void)
     pal_surface_free(&cube);
 }
 
+/* octants of a ball: each is the fill of a voxel of half the edge, and they sum to the voxel's */
+static void octants_are_the_fill_of_voxels_of_half_the_edge(void)
+{
+    pal_surface ball = shape_sphere(0.1);
+    pal_voxel_options options = {.resolution = 9, .border = true};
+    body b;
+    REQUIRE(make_body(&ball, &options, &b));
+    REQUIRE(!pal_hexes_fill(&b.hexes, &b.tets, &ball, NULL));
+    REQUIRE(b.hexes.octant);
+    /* the same lattice at half the edge, as one mesh of voxels */
+    pal_voxels fine = {.edge_m = b.voxels.edge_m / 2};
+    size_t n_cell = 1;
+    for (int k = 0; k < 3; k++) {
+        fine.n[k] = 2 * b.voxels.n[k], fine.low_m[k] = b.voxels.low_m[k], fine.origin_m[k] = b.voxels.origin_m[k];
+        n_cell *= (size_t)fine.n[k];
+    }
+    fine.kind = malloc(n_cell);
+    REQUIRE(fine.kind);
+    memset(fine.kind, 2, n_cell);
+    fine.n_inside = (int64_t)n_cell;
+    pal_tets tets;
+    pal_hexes half;
+    REQUIRE(!pal_voxels_split(&fine, &tets) && !pal_hexes_find(&tets, &half, NULL));
+    REQUIRE(!pal_hexes_fill(&half, &tets, &ball, NULL));
+    float *at = calloc(n_cell, sizeof *at);
+    REQUIRE(at);
+    for (int pass = 0; pass < 2; pass++) {
+        const pal_hexes *hexes = pass ? &b.hexes : &half;
+        const pal_tets *nodes = pass ? &b.tets : &tets;
+        double worst = 0;
+        for (size_t e = 0; e < (size_t)hexes->n_hex; e++) {
+            size_t place[3];
+            for (size_t k = 0; k < 3; k++)
+                place[k] = (size_t)((nodes->x[3 * (size_t)hexes->node[8 * e] + k] - fine.low_m[k]) / fine.edge_m + 0.5);
+            for (size_t q = 0; q < (pass ? 8 : 1); q++) {
+                size_t cell = (place[2] + (q >> 2)) * (size_t)fine.n[1];
+                cell = (cell + place[1] + (q >> 1 & 1)) * (size_t)fine.n[0] + place[0] + (q & 1);
+                if (pass == 0)
+                    at[cell] = hexes->fill[e];
+                else
+                    worst = fmax(worst, fabs((double)(hexes->octant[8 * e + q] - at[cell] / 8)));
+            }
+            CHECK(pal_octant_sum(hexes->octant + 8 * e) == hexes->fill[e]);
+        }
+        /* corners are rounded to 1/65536 of the voxel, of which there are two kinds */
+        CHECK_LE(worst, 2e-5);
+    }
+    free(at);
+    pal_hexes_free(&half), pal_tets_free(&tets), pal_voxels_free(&fine);
+    free_body(&b);
+    pal_surface_free(&ball);
+}
+
 /* voxels that a surface only touches hold exactly nothing, those within it exactly everything, the rest what a plane
  * cuts off */
 static void a_box_fills_its_voxels_exactly(void)
@@ -327,6 +380,7 @@ int main(void)
 {
     RUN(every_voxel_is_found_with_its_corners_in_order);
     RUN(order_within_a_voxel_does_not_matter_but_the_cube_does);
+    RUN(octants_are_the_fill_of_voxels_of_half_the_edge);
     RUN(a_box_fills_its_voxels_exactly);
     RUN(total_fill_is_the_volume_of_a_box_at_an_angle_and_of_a_ball);
     RUN(overlapping_hollow_and_open_bodies_are_filled_too);
