@@ -100,6 +100,7 @@ void pal_hex_multigrid_destroy(pal_hex_multigrid *mg)
     pal_spare_thread_destroy(&mg->spare_thread);
     pal_multigrid_destroy(mg->now.coarse);
     pal_multigrid_destroy(mg->next.coarse);
+    pal_stiff_nodes_destroy(&mg->now.stiff_nodes), pal_stiff_nodes_destroy(&mg->next.stiff_nodes);
     mg->now.coarse = mg->next.coarse = NULL;
 }
 
@@ -109,6 +110,15 @@ void pal_hex_multigrid_destroy(pal_hex_multigrid *mg)
 static void multiply(const pal_hex_multigrid *mg, const float *p)
 {
     pal_hex_single_multiply(&mg->levels->single, mg->levels->body->team, (float)mg->now.stiff, p, mg->levels->q);
+}
+
+/* q = weight p */
+static void weigh(const pal_hex_multigrid *mg, const float *p)
+{
+    const size_t n = (size_t)mg->levels->n_slot;
+    for (int g = 0; g < mg->levels->n_group; g++)
+        for (size_t at = (size_t)mg->levels->group[g], i = at; i < 3 * n; i += n)
+            store(mg->levels->q + i, load(mg->now.weight + at) * load(p + i));
 }
 
 /* one step of the smoother on a piece of the groups of slots: r, d, x, and q = weight times what is multiplied next */
@@ -246,6 +256,16 @@ static void run_transfer(transfer *t)
     pal_team_run(body->team, (body->n_node + NODES - 1) / NODES, transfer_nodes, t);
 }
 
+/* x += W S' (S A S')^-1 S W' (b - A x) */
+static void correct_stiff(pal_hex_multigrid *mg, const pal_warp *warp)
+{
+    pal_hex_levels *levels = mg->levels;
+    if (mg->now.stiff_nodes.n == 0) return;
+    multiply(mg, levels->x);
+    pal_stiff_nodes_correct(&mg->now.stiff_nodes, levels->body, warp, levels->n_slot, levels->b, levels->q, levels->x);
+    weigh(mg, levels->x);
+}
+
 /* the coarse levels' part: x += W P A1^-1 P' W' (b - A x) */
 static void correct(pal_hex_multigrid *mg, const pal_warp *warp)
 {
@@ -268,7 +288,9 @@ void pal_hex_multigrid_solve(pal_hex_multigrid *mg, const pal_warp *warp, const 
     const unsigned mode = pal_subnormals_flush();
     run_transfer(&(transfer){.mg = mg, .warp = warp, .in = r, .scale = 1 / largest, .what = TAKE});
     smooth(mg, true);
+    correct_stiff(mg, warp);
     correct(mg, warp);
+    correct_stiff(mg, warp);
     smooth(mg, false);
     run_transfer(&(transfer){.mg = mg, .warp = warp, .out = z, .scale = largest, .what = GIVE});
     pal_subnormals_restore(mode);
@@ -277,7 +299,7 @@ void pal_hex_multigrid_solve(pal_hex_multigrid *mg, const pal_warp *warp, const 
 /* ---- values ---- */
 
 /* values of the coarser levels, of the rotations given */
-static pal_err fill_levels(const pal_hex_levels *levels, const float *rotation, const pal_hex_values *to)
+static pal_err fill_levels(const pal_hex_levels *levels, const float *rotation, pal_hex_values *to)
 {
     const pal_grid_level *grid = &levels->grid.level[0];
     const pal_body *body = levels->body;
@@ -295,7 +317,8 @@ static pal_err fill_levels(const pal_hex_levels *levels, const float *rotation, 
     }
     for (int i = 0; i < body->n_node; i++)
         pal_multigrid_add_mass(to->coarse, i, (double)to->weight[body->node_order->slot[i]]);
-    return pal_multigrid_finish(to->coarse);
+    PAL_TRY(pal_multigrid_finish(to->coarse));
+    return pal_stiff_nodes_update(&to->stiff_nodes, body, &levels->single, rotation, to->weight, to->stiff);
 }
 
 /* masses of the finest level, which an edit may change while a spare thread makes the rest */
@@ -346,9 +369,7 @@ static void apply(void *self, float scale)
     const pal_hex_multigrid *mg = self;
     const size_t n = (size_t)mg->levels->n_slot;
     float *d = mg->levels->d, *q = mg->levels->q;
-    for (int g = 0; g < mg->levels->n_group; g++)
-        for (size_t at = (size_t)mg->levels->group[g], i = at; i < 3 * n; i += n)
-            store(q + i, load(mg->now.weight + at) * load(d + i));
+    weigh(mg, d);
     multiply(mg, d);
     for (int g = 0; g < mg->levels->n_group; g++)
         for (size_t at = (size_t)mg->levels->group[g], i = at; i < 3 * n; i += n)
@@ -416,6 +437,7 @@ pal_err pal_hex_multigrid_adopt(pal_hex_multigrid *mg)
 
 double pal_hex_multigrid_flops(const pal_hex_multigrid *mg)
 {
+    const pal_stiff_nodes *stiff = &mg->now.stiff_nodes;
     /* an element's 36 blocks turned and interpolated; the coarser levels add a third */
-    return 1e4 * mg->levels->cubes->n_hex;
+    return 1e4 * mg->levels->cubes->n_hex + (stiff->n > 0 ? pal_cholesky_flops(stiff->factor) : 0);
 }

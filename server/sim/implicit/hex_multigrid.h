@@ -3,15 +3,16 @@
  * no matrix: it multiplies in single precision with the present rotations, and smooths in place (num/multigrid.h has
  * the smoother and the coarser levels). The coarser levels are those of the state at the last update or refresh, warped
  * to the present one (warp.h): z = W P A1^-1 P' W' r. The number of iterations of conjugate gradients does not grow
- * with the number of nodes: 10 or 11 to 1e-6 (tests/sim/implicit/test_preconditioner.c). Memory: the caller's arena,
- * and the heap for the coarser levels, in make and in the first refresh, whose factor of the coarsest level uses it in
- * every update. Thread: [load] to make, then [sim]. */
+ * with the number of nodes: 10 or 11 to 1e-6 (tests/sim/implicit/test_preconditioner.c). Strong contrasts of stiffness
+ * have a factor of their own (stiff_nodes.h). Memory: the caller's arena, and the heap for the coarser levels, in make
+ * and in the first refresh; the factors of the coarsest level and of stiff nodes use it in every update. Thread: [load]
+ * to make, then [sim]. */
 #ifndef PAL_SIM_IMPLICIT_HEX_MULTIGRID_H
 #define PAL_SIM_IMPLICIT_HEX_MULTIGRID_H
 #include "server/base/spare_thread.h"
 #include "server/num/multigrid.h"
 #include "server/sim/elements/elastic_hex_single.h"
-#include "server/sim/implicit/warp.h"
+#include "server/sim/implicit/stiff_nodes.h"
 
 /* what all preconditioners of a body have in common, of which one solves at a time */
 typedef struct pal_hex_levels {
@@ -31,6 +32,7 @@ typedef struct pal_hex_values {
     float lambda;            /* no eigenvalue of D^-1 A is larger */
     float *weight, *inverse; /* mass M; 1 / D, 0 at fixed nodes and empty slots [n_slot] */
     pal_multigrid *coarse;   /* of the next values: NULL before the first refresh */
+    pal_stiff_nodes stiff_nodes;
 } pal_hex_values;
 
 typedef struct pal_hex_multigrid {

@@ -31,17 +31,6 @@ static const pal_elastic_hexes *find_cubes(const pal_system *system)
     return cubes;
 }
 
-/* stiffest element over the softest */
-static double contrast(const pal_elastic_hexes *cubes)
-{
-    double low = INFINITY, high = 0;
-    for (int i = 0; i < PAL_LANES * cubes->n_block; i++) {
-        if (!(cubes->share[i] > 0)) continue;
-        low = fmin(low, cubes->mu[i] / cubes->share[i]), high = fmax(high, cubes->mu[i] / cubes->share[i]);
-    }
-    return high / low;
-}
-
 static pal_err make_pattern(pal_preconditioner *p, const pal_preconditioner *like, pal_arena *arena)
 {
     if (!like || !like->blocks.value) return pal_system_pattern(p->system, arena, &p->blocks);
@@ -85,12 +74,9 @@ static pal_err choose(pal_preconditioner *p, const pal_elastic_hexes *cubes, pal
     if (p->reason[0]) return PAL_ERR_OK;
     if (body->n_node < PAL_MULTIGRID_NODES) {
         PAL_TRY(analyse_apart(p));
-        const double entries = (double)pal_cholesky_nonzeros(p->factor), stiff = contrast(cubes);
-        snprintf(p->reason, sizeof p->reason,
-                 "its factor has %.1f million entries, its stiffest element is %.0f times the "
-                 "softest",
-                 1e-6 * entries, stiff);
-        if (entries < PAL_FACTOR_ENTRIES || stiff > PAL_MULTIGRID_CONTRAST) return PAL_ERR_OK;
+        const double entries = (double)pal_cholesky_nonzeros(p->factor);
+        snprintf(p->reason, sizeof p->reason, "its factor has %.1f million entries", 1e-6 * entries);
+        if (entries < PAL_FACTOR_ENTRIES) return PAL_ERR_OK;
         pal_cholesky_destroy(p->factor);
         p->factor = NULL, p->analyse_s = 0;
     } else {

@@ -3,9 +3,9 @@
  *   factor:     a Cholesky factor, warped (warp.h); best for small bodies.
  *   multigrid:  hex_multigrid.h; bodies of voxel hexahedra, any number of nodes;
  *   incomplete: an incomplete factor of the present state, in a tenth of the memory of a factor.
- * `auto` takes the factor for small bodies, while it has fewer than 1.5 million entries; for strong contrasts of
- * stiffness up to 5,000 nodes; and wherever multigrid cannot be had; else multigrid. Jacobi is never chosen: it is for
- * comparison, and for bodies whose elements change faster than levels can be made.
+ * `auto` takes the factor for small bodies, while it has fewer than 1.5 million entries, and wherever multigrid cannot
+ * be had; else multigrid. Jacobi is never chosen: it is for comparison, and for bodies whose elements change faster
+ * than levels can be made.
  *
  * When solves need too many iterations, a newer factor or newer levels are made on a spare thread. Deterministic: they
  * take effect after a simulated time that follows from their operation count, never from the clock. Thread: [load] to

@@ -41,15 +41,16 @@
 #define PAL_FREQUENCY_SHIFT 1e-12
 #define PAL_FREQUENCY_ZERO  1e-10
 
-/* stiffest element over the softest, above which a factor is best up to PAL_MULTIGRID_NODES: multigrid takes 17
- * iterations at 100 and 34 at 10,000, for 10 without (tests/sim/implicit/test_preconditioner.c) */
-#define PAL_MULTIGRID_CONTRAST 100
+/* element over the softest, above which it is stiff to multigrid: with 9 iterations in place of 7, or 10 in place of 5,
+ * the factor of the stiff nodes pays for itself (tests/sim/implicit/test_preconditioner.c) */
+#define PAL_STIFF_CONTRAST 20
 /* entries of a factor that solves faster than multigrid: 6 MB, most of which stays in the processor's caches
  * (tests/bench) */
 #define PAL_FACTOR_ENTRIES 1.5e6
 
 enum {
-    /* nodes below which a factor is best whatever its pattern, and above which it is not analysed (tests/bench) */
+    /* nodes below which a factor is best whatever its pattern, and above which it is not analysed; also not of the
+     * stiff nodes alone (tests/bench) */
     PAL_MULTIGRID_NODES_MIN = 1000,
     PAL_MULTIGRID_NODES = 5000,
     /* the coarsest level: a factor that takes a twentieth of a cycle (tests/sim/implicit/test_preconditioner.c) */
