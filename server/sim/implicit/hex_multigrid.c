@@ -435,6 +435,17 @@ pal_err pal_hex_multigrid_adopt(pal_hex_multigrid *mg)
     return PAL_ERR_OK;
 }
 
+double pal_hex_multigrid_stiffest(const pal_hex_multigrid *mg)
+{
+    const pal_body *body = mg->levels->body;
+    double max = 0;
+    for (int i = 0; i < body->n_node; i++) {
+        const double inverse = (double)mg->now.inverse[body->node_order->slot[i]];
+        if (inverse > 0 && body->mass_kg[i] > 0) max = fmax(max, 1 / (inverse * body->mass_kg[i]));
+    }
+    return max;
+}
+
 double pal_hex_multigrid_flops(const pal_hex_multigrid *mg)
 {
     const pal_stiff_nodes *stiff = &mg->now.stiff_nodes;

@@ -57,6 +57,8 @@ pal_err pal_hex_multigrid_refresh(pal_hex_multigrid *mg, double mass, double sti
 pal_err pal_hex_multigrid_adopt(pal_hex_multigrid *mg);
 double pal_hex_multigrid_flops(const pal_hex_multigrid *mg); /* operations of a refresh, equal on all machines */
 void pal_hex_multigrid_rotate(pal_hex_multigrid *mg); /* takes the rotations of the last linearise, finest level */
+/* largest of diagonal of A over mass_kg, at the last update */
+double pal_hex_multigrid_stiffest(const pal_hex_multigrid *mg);
 /* z ~ A^-1 r [n_dof][3], z may be r; warp: since the last update */
 void pal_hex_multigrid_solve(pal_hex_multigrid *mg, const pal_warp *warp, const double *r, double *z);
 #endif

@@ -3,6 +3,7 @@
 
 #include "server/num/lowest_mode.h"
 #include "server/num/random.h"
+#include "server/sim/implicit/preconditioner.h"
 #include "server/sim/implicit/rest_stiffness.h"
 #include "server/sim/implicit/tuning.h"
 
@@ -16,7 +17,11 @@ typedef struct search {
     pal_block_matrix blocks; /* K + shift M at rest */
     bool assembled;          /* blocks give K v; else the components' tangents do */
     uint8_t *skip;           /* dofs that do not move [n_dof] */
-    pal_rest_preconditioner preconditioner;
+    pal_rest_preconditioner incomplete;
+    bool coarsens; /* multigrid in its place */
+    pal_node_rotations rotations;
+    pal_preconditioner multigrid;
+    double scale_1_s2; /* of the order of the square of the highest frequency */
 } search;
 
 static void clear(const search *s, double *v)
@@ -45,8 +50,11 @@ static void multiply_stiffness(void *user, const double *v, double *out)
 
 static void precondition(void *user, const double *r, double *out)
 {
-    const search *s = user;
-    pal_rest_preconditioner_solve(&s->preconditioner, r, out);
+    search *s = user;
+    if (s->coarsens)
+        pal_preconditioner_solve(&s->multigrid, r, out);
+    else
+        pal_rest_preconditioner_solve(&s->incomplete, r, out);
 }
 
 /* ---- the search ---- */
@@ -64,6 +72,32 @@ static pal_err assemble(search *s, const pal_build *build, bool tangents)
     (void)pal_system_probe(&s->system, INT_MAX);
     pal_system_assemble(&s->system, &s->blocks);
     return PAL_ERR_OK;
+}
+
+/* REFUSED: the body is not of the kind that has levels, or too small */
+static pal_err coarsen(search *s, const pal_build *build)
+{
+    pal_diagnostic diag;
+    const pal_preconditioner_options options = {.kind = PAL_PRECONDITION_MULTIGRID};
+    if (!pal_preconditioner_suits_multigrid(&s->system)) return PAL_ERR_REFUSED;
+    s->system.mass = 0, s->system.stiff = 1, s->system.damp = 0;
+    pal_system_linearise_rest(&s->system);
+    PAL_TRY(pal_node_rotations_make(&s->system, build->arena, &s->rotations));
+    PAL_TRY(pal_preconditioner_make(&options, &s->system, &s->rotations, build->arena, &diag, &s->multigrid));
+    s->coarsens = true;
+    PAL_TRY(pal_preconditioner_update(&s->multigrid));
+    s->scale_1_s2 = pal_hex_multigrid_stiffest(&s->multigrid.multigrid);
+    return PAL_ERR_OK;
+}
+
+/* K, what multiplies with it, and the preconditioner */
+static pal_err prepare(search *s, const pal_build *build, bool tangents)
+{
+    pal_err err = tangents ? coarsen(s, build) : PAL_ERR_REFUSED;
+    if (err != PAL_ERR_REFUSED) return err;
+    PAL_TRY(assemble(s, build, tangents));
+    s->scale_1_s2 = pal_rest_stiffness_scale_1_s2(s->body, &s->blocks, s->skip);
+    return pal_rest_preconditioner_make(s->body, &s->blocks, s->skip, build->arena, &s->incomplete);
 }
 
 /* five digits: damping and sleep, which follow from the frequency, are then the same with every library that factors */
@@ -93,14 +127,12 @@ static pal_err find(search *s, const pal_build *build, double *mode)
                          .work = PAL_NEW(build->arena, double, 9 * n)};
     if (!s->skip || !m.x || !m.work) return PAL_ERR_MEMORY;
     for (int i = 0; i < body->n_dof; i++) s->skip[i] = body->support[i] || (body->active && !(body->mass_kg[i] > 0));
-    PAL_TRY(assemble(s, build, tangents));
-    const double scale_1_s2 = pal_rest_stiffness_scale_1_s2(body, &s->blocks, s->skip);
-    PAL_TRY(pal_rest_preconditioner_make(body, &s->blocks, s->skip, build->arena, &s->preconditioner));
+    PAL_TRY(prepare(s, build, tangents));
     for (size_t i = 0; i < n; i++) m.work[i] = pal_random_unit(7, i) - 0.5;
     multiply_mass(s, m.work, m.work + n);
     precondition(s, m.work + n, m.x);
     pal_lowest_mode_run(&m, PAL_SEARCH_TOLERANCE, PAL_FREQUENCY_ITERATIONS);
-    if (!(m.lambda > PAL_FREQUENCY_ZERO * scale_1_s2)) return PAL_ERR_OK;
+    if (!(m.lambda > PAL_FREQUENCY_ZERO * s->scale_1_s2)) return PAL_ERR_OK;
     body->lowest_1_s = round_digits(sqrt(m.lambda));
     body->lowest_error = m.error;
     return PAL_ERR_OK;
@@ -115,7 +147,8 @@ pal_err pal_lowest_frequency_find(const pal_build *build, double *mode)
     own.arena = arena, own.diag = NULL;
     build->body->lowest_1_s = build->body->lowest_error = 0;
     pal_err err = find(&s, &own, mode);
-    pal_rest_preconditioner_destroy(&s.preconditioner);
+    pal_rest_preconditioner_destroy(&s.incomplete);
+    pal_preconditioner_destroy(&s.multigrid);
     pal_arena_destroy(arena);
     /* without a preconditioner, or beyond the bounded work, it is not known */
     return err == PAL_ERR_NUMERIC || err == PAL_ERR_BUDGET ? PAL_ERR_OK : err;

@@ -1,9 +1,9 @@
 /* The lowest angular frequency w1 of a body at rest: K v = w1^2 M v, K the stiffness of its FORCE components at rest
  * and M its masses. K comes from the components' tangents, or, where an elastic component has none (springs), from
- * differences of forces: points without a common neighbour move together. The preconditioner is an
- * incomplete factor of K (num/incomplete_cholesky.h) with the rigid motions of clusters of points
- * (num/rigid_clusters.h), so that 10 to 70 iterations do for every size and shape (num/lowest_mode.h). Thread: [load],
- * or [sim] between steps: it takes heap memory. */
+ * differences of forces: points without a common neighbour move together. The preconditioner is
+ * multigrid where the body has levels (hex_multigrid.h), else an incomplete factor of K (num/incomplete_cholesky.h)
+ * with the rigid motions of clusters of points (num/rigid_clusters.h), so that 10 to 70 iterations do for every size
+ * and shape (num/lowest_mode.h). Thread: [load], or [sim] between steps: it takes heap memory. */
 #ifndef PAL_SIM_IMPLICIT_LOWEST_FREQUENCY_H
 #define PAL_SIM_IMPLICIT_LOWEST_FREQUENCY_H
 #include "server/sim/core/effect.h"

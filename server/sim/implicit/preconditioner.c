@@ -134,6 +134,11 @@ pal_err pal_preconditioner_make(const pal_preconditioner_options *options, pal_s
     }
 }
 
+bool pal_preconditioner_suits_multigrid(const pal_system *system)
+{
+    return system->body->n_node >= PAL_MULTIGRID_NODES_MIN && find_cubes(system);
+}
+
 void pal_preconditioner_destroy(pal_preconditioner *p)
 {
     pal_cholesky_destroy(p->factor);

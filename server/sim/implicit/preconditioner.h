@@ -61,6 +61,8 @@ pal_err pal_preconditioner_make(const pal_preconditioner_options *options, pal_s
                                 const pal_node_rotations *rotations, pal_arena *arena, pal_diagnostic *diag,
                                 pal_preconditioner *out);
 void pal_preconditioner_destroy(pal_preconditioner *p);
+/* true: of a body for which multigrid is faster than a factor whose entries are many; it may still be refused [any] */
+bool pal_preconditioner_suits_multigrid(const pal_system *system);
 
 /* takes the system's coefficients and last linearise, at the present rotations; a refresh in progress is dropped.
  * NUMERIC, MEMORY: a factor in use stays; of the other kinds no solve may follow */

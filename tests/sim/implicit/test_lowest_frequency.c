@@ -261,6 +261,30 @@ static void a_large_body_has_it(void)
     box_free(&box);
 }
 
+/* bodies with levels (hex_multigrid.h): the reference beam with 8 voxels across, whose first bending mode follows from
+ * Euler and Bernoulli's, with shear as above; and one that nothing holds */
+static void a_body_with_levels_has_it(void)
+{
+    fem_beam b;
+    beam_reference(&b, 8);
+    beam_element(&b, "hex8_bbar", "corotational");
+    REQUIRE(!beam_open(&b, &diag));
+    REQUIRE(!pal_world_find_lowest(b.world, 0, NULL));
+    const pal_material *m = &b.def->material;
+    const double wanted = 1.8751 * 1.8751 * sqrt(m->young_Pa * 0.05 * 0.05 / 12 / m->density_kg_m3) / (0.2 * 0.2);
+    printf("  %d points: %.4g 1/s of a thin beam's %.4g, error %.2g\n", b.body->n_dof, b.body->lowest_1_s, wanted,
+           b.body->lowest_error);
+    CHECK_LE(b.body->lowest_error, 0.01);
+    CHECK(b.body->lowest_1_s / wanted > 0.9 && b.body->lowest_1_s / wanted < 1.0);
+    beam_free(&b);
+    beam_make(&b, 32, 8, 8, 0.05 / 8, false);
+    beam_element(&b, "hex8_bbar", "corotational");
+    REQUIRE(!beam_open(&b, &diag));
+    CHECK_INT(pal_world_find_lowest(b.world, 0, NULL), 0);
+    CHECK_NEAR(b.body->lowest_1_s, 0, 0);
+    beam_free(&b);
+}
+
 int main(void)
 {
     RUN(slender_finite_elements_have_it);
@@ -270,5 +294,6 @@ int main(void)
     RUN(what_is_not_held_has_none);
     RUN(a_penalty_holds_it);
     RUN(a_large_body_has_it);
+    RUN(a_body_with_levels_has_it);
     return check_report();
 }
