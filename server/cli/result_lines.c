@@ -23,7 +23,7 @@ struct pal_result_lines {
     int n, shard, n_shard; /* shard 0: merged */
     cJSON **line;          /* parsed lines by index of their result [n] */
     FILE *file;            /* of the shard; NULL: merged */
-    char path[PATH];
+    char path[PATH];       /* of that file; the folder: merged */
 };
 
 pal_err pal_shard_read(const char *text, int *shard, int *n_shard, pal_diagnostic *diag)
@@ -38,6 +38,14 @@ pal_err pal_shard_read(const char *text, int *shard, int *n_shard, pal_diagnosti
     if (i < 1 || i > n) return PAL_REFUSE(diag, "--shard: %.40s: shards are numbered from 1 to %ld", text, n);
     *shard = (int)i, *n_shard = (int)n;
     return PAL_ERR_OK;
+}
+
+pal_err pal_shard_flags_check(pal_shard_flags *flags, pal_diagnostic *diag)
+{
+    if (flags->merge && (flags->shard || flags->folder))
+        return PAL_REFUSE(diag, "--merge: does not go with --shard and --results");
+    if (!flags->shard != !flags->folder) return PAL_REFUSE(diag, "--shard and --results: go together");
+    return flags->shard ? pal_shard_read(flags->shard, &flags->index, &flags->n, diag) : PAL_ERR_OK;
 }
 
 uint64_t pal_result_input_file(uint64_t hash, const char *path)
@@ -221,10 +229,6 @@ static pal_err merge_shard(pal_result_lines *r, const char *folder, int shard, p
     if (!file) return no_io(path, "cannot be opened", diag);
     pal_err err = read_lines(r, file, path, shard, r->n_shard, &whole, diag);
     fclose(file);
-    for (int k = shard - 1; k < r->n && !err; k += r->n_shard)
-        if (!r->line[k])
-            err = PAL_REFUSE(diag, "%s: shard %d of %d is unfinished: result %d is missing; run it with --shard %d/%d",
-                             path, shard, r->n_shard, k, shard, r->n_shard);
     return err;
 }
 
@@ -234,6 +238,7 @@ pal_err pal_result_lines_merge(const char *folder, const pal_result_list *list, 
     pal_result_lines *r;
     *out = NULL;
     pal_err err = make(list, &r, diag);
+    if (!err) snprintf(r->path, PATH, "%s", folder);
     if (!err) err = count_shards(r, folder, &r->n_shard, diag);
     for (int shard = 1; !err && shard <= r->n_shard; shard++) err = merge_shard(r, folder, shard, diag);
     if (err)
@@ -241,6 +246,15 @@ pal_err pal_result_lines_merge(const char *folder, const pal_result_list *list, 
     else
         *out = r;
     return err;
+}
+
+pal_err pal_result_lines_complete(const pal_result_lines *r, int n, pal_diagnostic *diag)
+{
+    for (int k = 0; k < n; k++)
+        if (k >= r->n || !r->line[k])
+            return PAL_REFUSE(diag, "%s: shard %d of %d is unfinished: result %d is missing; run it with --shard %d/%d",
+                              r->path, k % r->n_shard + 1, r->n_shard, k, k % r->n_shard + 1, r->n_shard);
+    return PAL_ERR_OK;
 }
 
 void pal_result_lines_close(pal_result_lines *r)

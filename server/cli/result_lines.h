@@ -29,6 +29,13 @@ typedef struct pal_result_list {
     int n;               /* results of all shards */
 } pal_result_list;
 
+/* the flags of a command with shards */
+typedef struct pal_shard_flags {
+    const char *shard, *folder, *merge; /* --shard, --results, --merge; NULL: absent */
+    int index, n;                       /* I and N of --shard, by the check */
+} pal_shard_flags;
+/* Reads --shard. Errors: REFUSED: flags that do not go together, or no I/N. */
+pal_err pal_shard_flags_check(pal_shard_flags *flags, pal_diagnostic *diag);
 /* Reads "I/N" with 1 <= I <= N <= PAL_SHARDS_MAX. Errors: REFUSED. */
 pal_err pal_shard_read(const char *text, int *shard, int *n_shard, pal_diagnostic *diag);
 /* Hash of the bytes of a file, continued from `hash`; of its name alone if it cannot be read. */
@@ -39,10 +46,12 @@ uint64_t pal_result_input_file(uint64_t hash, const char *path);
  */
 pal_err pal_result_lines_open(const char *folder, const pal_result_list *list, int shard, int n_shard,
                               pal_result_lines **out, pal_diagnostic *diag);
-/* Reads the files of all shards in a folder. Errors: REFUSED: no files, files of different N, a missing or unfinished
- * shard (named by its number), results of another input, a damaged line; IO, MEMORY. */
+/* Reads the files of all shards in a folder. Errors: REFUSED: no files, files of different N, a missing shard (named by
+ * its number), results of another input, a damaged line; IO, MEMORY. */
 pal_err pal_result_lines_merge(const char *folder, const pal_result_list *list, pal_result_lines **out,
                                pal_diagnostic *diag);
+/* Are the results 0 to n - 1 there? Errors: REFUSED names the shard that is unfinished. */
+pal_err pal_result_lines_complete(const pal_result_lines *lines, int n, pal_diagnostic *diag);
 void pal_result_lines_close(pal_result_lines *lines); /* accepts NULL */
 
 /* Belongs the result to this shard? After a merge: always. */

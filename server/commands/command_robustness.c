@@ -410,12 +410,6 @@ static bool known_models(const char *models)
     return known;
 }
 
-/* which results to compute, and where they stand (result_lines.h) */
-typedef struct shard_flags {
-    const char *shard, *folder, *merge; /* --shard, --results, --merge */
-    int index, n;                       /* of --shard */
-} shard_flags;
-
 /* hash of the jobs, the options and the files that the words name */
 static uint64_t input_of(const pal_robustness_job *job, int n, const pal_robustness_options *options)
 {
@@ -434,13 +428,12 @@ static uint64_t input_of(const pal_robustness_job *job, int n, const pal_robustn
 }
 
 /* takes the results that are there; the lines of a merge hold all of them */
-static pal_err open_lines(run_all *all, const shard_flags *flags, pal_diagnostic *diag)
+static pal_err open_lines(run_all *all, const pal_shard_flags *flags, pal_diagnostic *diag)
 {
     const pal_result_list list = {"robustness", input_of(all->job, all->n, all->options), all->n};
-    if (flags->merge)
-        PAL_TRY(pal_result_lines_merge(flags->merge, &list, &all->lines, diag));
-    else if (flags->shard)
-        PAL_TRY(pal_result_lines_open(flags->folder, &list, flags->index, flags->n, &all->lines, diag));
+    if (flags->merge) PAL_TRY(pal_result_lines_merge(flags->merge, &list, &all->lines, diag));
+    if (flags->merge) PAL_TRY(pal_result_lines_complete(all->lines, all->n, diag));
+    if (flags->shard) PAL_TRY(pal_result_lines_open(flags->folder, &list, flags->index, flags->n, &all->lines, diag));
     for (int k = 0; k < all->n && all->lines; k++) {
         const cJSON *result = pal_result_lines_find(all->lines, k);
         if (result && !stored_read(result, &all->job[k]))
@@ -450,7 +443,7 @@ static pal_err open_lines(run_all *all, const shard_flags *flags, pal_diagnostic
 }
 
 /* runs the jobs that have no result yet, in parallel where there are several */
-static pal_err run(run_all *all, const shard_flags *flags, pal_diagnostic *diag)
+static pal_err run(run_all *all, const pal_shard_flags *flags, pal_diagnostic *diag)
 {
     pal_team *team = NULL;
     const int n = all->n;
@@ -471,18 +464,8 @@ static pal_err run(run_all *all, const shard_flags *flags, pal_diagnostic *diag)
     return all->job[0].err;
 }
 
-/* NULL: the flags go together */
-static const char *check_shard_flags(shard_flags *flags, const char *picture, pal_diagnostic *diag)
-{
-    if (flags->merge && (flags->shard || flags->folder)) return "--merge: does not go with --shard and --results";
-    if (!flags->shard != !flags->folder) return "--shard and --results: go together";
-    if (picture && (flags->shard || flags->merge)) return "--picture: does not go with --shard and --merge";
-    if (flags->shard && pal_shard_read(flags->shard, &flags->index, &flags->n, diag)) return diag->text;
-    return NULL;
-}
-
 /* what a shard did */
-static int report_shard(const pal_flag_common *common, const run_all *all, const shard_flags *flags)
+static int report_shard(const pal_flag_common *common, const run_all *all, const pal_shard_flags *flags)
 {
     int own = 0, refused = 0;
     for (int k = 0; k < all->n; k++)
@@ -532,7 +515,7 @@ int command_robustness(int argc, char **argv)
     static char about[4096];
     const char *picture = NULL, *only = NULL, *generate = NULL, *models = "springs,fem", *table_path = NULL;
     double seed = 1, seconds = 0;
-    shard_flags shard = {0};
+    pal_shard_flags shard = {0};
     const pal_flag flag[] = {
         {"--only", "NAME", PAL_FLAG_TEXT, &only, 0, 0, "run this case alone"},
         {"--generate", "ORGAN,...", PAL_FLAG_TEXT, &generate, 0, 0,
@@ -591,8 +574,9 @@ int command_robustness(int argc, char **argv)
         if (pal_organ_name_read(job[k].word, &family, &number, &diag))
             return pal_flags_wrong(&common, "--generate: %s", diag.text);
     }
-    const char *sentence = check_shard_flags(&shard, picture, &diag);
-    if (sentence) return pal_flags_wrong(&common, "%s", sentence);
+    if (pal_shard_flags_check(&shard, &diag)) return pal_flags_wrong(&common, "%s", diag.text);
+    if (picture && (shard.shard || shard.merge))
+        return pal_flags_wrong(&common, "--picture: does not go with --shard and --merge");
     if (picture && n > 1) return pal_flags_wrong(&common, "--picture: goes with one scene");
     pal_robustness_options options;
     pal_robustness_default(&options);

@@ -40,11 +40,12 @@ check "the table has three rows" [ "$(grep -c '^| [a-z]* | fem |' out)" -eq 3 ]
 end
 
 begin "robustness: a worker that died repeats its own result only"
-# a death while its second result was being written leaves half a line; processor times tell a repeated result
+# a death while its second result was being written leaves half a line; processor times tell a repeated result. The two
+# run side by side and stand in the order in which they ended
 cp -r plain died
 head -c -100 plain/robustness-1-of-2.jsonl >died/robustness-1-of-2.jsonl
 run $organs --merge died
-refused 1 'shard 1 of 2 is unfinished: result 2 is missing; run it with --shard 1/2'
+refused 1 'shard 1 of 2 is unfinished: result [02] is missing; run it with --shard 1/2'
 run $organs --shard 1/2 --results died
 check "exit code $code" code_is 0
 head -n 2 plain/robustness-1-of-2.jsonl >before
@@ -80,10 +81,44 @@ run $organs --shard 1/2 --results odd
 refused 1 'is not of shard 1 of 2, as its name says'
 sed 's/"index":2/"index":1/' plain/robustness-1-of-2.jsonl >odd/robustness-1-of-2.jsonl
 run $organs --shard 1/2 --results odd
-refused 1 'robustness-1-of-2.jsonl: line 3 is damaged'
+refused 1 'robustness-1-of-2.jsonl: line [23] is damaged'
 mkdir empty
 run $organs --merge empty
 refused 1 'empty: holds no results of palpate robustness'
+end
+
+# of a point of a study everything but what was timed, or is chosen by times
+points() {
+    grep -vE '"(ms|ms_p95|prepare_s|read_ms|predicted_ms|front|reason|command)":' "$1"
+}
+points_equal() { [ "$(points "$1")" = "$(points "$2")" ]; }
+beam="study $problems/beam.json --case tip --quick --methods fem --seconds 0.05"
+
+begin "study: two shards, one of which died, equal one run but for times"
+run $beam --out one
+check "exit code $code" code_is 0
+for i in 1 2; do
+    run $beam --shard $i/2 --results parts
+    check "exit code $code of shard $i" code_is 0
+done
+cp parts/study-1-of-2.jsonl before
+n=$(lines before)
+check "shard 1 has its head and some of the points" [ "$n" -gt 2 ]
+head -c -50 before >parts/study-1-of-2.jsonl
+run $beam --merge parts --out two
+refused 1 'shard 1 of 2 is unfinished'
+run $beam --shard 1/2 --results parts
+check "exit code $code of the shard started again" code_is 0
+check "it kept $((n - 2)) points" has out "$((n - 1)) results are in parts, $((n - 2)) of them from before"
+check "their lines stand as before" [ "$(head -n $((n - 1)) before)" = "$(head -n $((n - 1)) parts/study-1-of-2.jsonl)" ]
+run $beam --merge parts --out two
+check "exit code $code of the merge" code_is 0
+check "the merged study has other figures" points_equal one/study.json two/study.json
+check "a page" has two/study.html "</html>"
+run study "$problems/beam.json" --case tip --quick --methods fem --seconds 0.06 --merge parts --out three
+refused 1 'the results belong to other input'
+run $beam --shard 1/2 --results parts --out three
+refused 2 'does not go with'
 end
 
 if command -v mpirun >/dev/null 2>&1; then
