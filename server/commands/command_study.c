@@ -5,9 +5,9 @@
 #include "server/base/machine.h"
 #include "server/calibrate/journal.h"
 #include "server/cli/report.h"
-#include "server/cli/result_lines.h"
 #include "server/commands/commands.h"
 #include "server/commands/rendered_force.h"
+#include "server/commands/study_lines.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/json_reader.h"
 #include "server/study/studied_scene.h"
@@ -262,77 +262,7 @@ static bool store(const pal_study *study, int n_total, void *user)
     return !run->store_err && (!pal_stop_asked() || study->n_point == n_total);
 }
 
-/* ---- shards: a result is a study of one point (study_store.h) ---- */
-
-/* cJSON prints 15 digits of a number that it has read, where these are near enough: numbers become text of 17 */
-static bool make_exact(cJSON *tree)
-{
-    cJSON *child;
-    bool good = true;
-    cJSON_ArrayForEach(child, tree)
-    {
-        good = make_exact(child) && good;
-        if (!cJSON_IsNumber(child)) continue;
-        char text[32];
-        snprintf(text, sizeof text, "%.17g", child->valuedouble);
-        child->type = cJSON_Raw, child->valuestring = strdup(text);
-        good = child->valuestring && good;
-    }
-    return good;
-}
-
-/* result -> a study of one point; heap */
-static pal_err read_result(const study_run *run, int index, pal_study_file **out, pal_diagnostic *diag)
-{
-    char name[PAL_STUDY_PATH];
-    snprintf(name, sizeof name, "%.1000s: result %d", run->shard.merge ? run->shard.merge : run->shard.folder, index);
-    cJSON *tree = cJSON_Duplicate(pal_result_lines_find(run->lines, index), true);
-    char *json = tree && make_exact(tree) ? cJSON_PrintUnformatted(tree) : NULL;
-    cJSON_Delete(tree);
-    if (!json) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory", name);
-    pal_err err = pal_study_file_parse(name, json, strlen(json), out, diag);
-    cJSON_free(json);
-    if (!err && (*out)->study.n_point != 1) err = PAL_REFUSE(diag, "%s is damaged: it has not one point", name);
-    return err;
-}
-
-/* the points that the lines hold, in the order of the sweep -> run->old */
-static pal_err read_results(study_run *run, pal_diagnostic *diag)
-{
-    for (int k = 0; k < PAL_STUDY_POINTS; k++) {
-        pal_study_file *one = NULL;
-        if (!pal_result_lines_find(run->lines, k)) continue;
-        pal_err err = read_result(run, k, &one, diag);
-        if (!err && run->old && strcmp(run->old->study.machine, one->study.machine) != 0)
-            err = PAL_REFUSE(diag, "result %d was measured on another processor, %.150s, whose times do not compare", k,
-                             one->study.machine);
-        if (!err && !run->old) {
-            run->old = one;
-            continue;
-        }
-        if (!err) run->old->study.point[run->old->study.n_point++] = one->study.point[0];
-        free(one);
-        PAL_TRY(err);
-    }
-    return PAL_ERR_OK;
-}
-
-static pal_err open_results(study_run *run, pal_diagnostic *diag)
-{
-    const pal_study_file *f = run->file;
-    const char *part[] = {f->shape, f->digest, f->loads, f->methods};
-    uint64_t input = PAL_HASH_START;
-    for (size_t k = 0; k < sizeof part / sizeof *part; k++) input = pal_hash_bytes(input, part[k], strlen(part[k]) + 1);
-    const pal_result_list list = {"study", input, PAL_STUDY_POINTS};
-    const pal_shard_flags *s = &run->shard;
-    PAL_TRY(s->merge ? pal_result_lines_merge(s->merge, &list, &run->lines, diag)
-                     : pal_result_lines_open(s->folder, &list, s->index, s->n, &run->lines, diag));
-    PAL_TRY(read_results(run, diag));
-    if (s->merge && !run->old) return PAL_REFUSE(diag, "%s: the shards hold no results", s->merge);
-    if (s->merge) PAL_TRY(pal_result_lines_complete(run->lines, run->old->n_total, diag));
-    if (run->old) run->n_before = run->old->study.n_point, run->before = &run->old->study;
-    return PAL_ERR_OK;
-}
+/* ---- shards ---- */
 
 static bool own(int index, void *user)
 {
@@ -346,17 +276,8 @@ static bool store_line(const pal_study *study, int n_total, void *user)
 {
     study_run *run = user;
     if (pal_result_lines_find(run->lines, run->index)) return !pal_stop_asked();
-    pal_study_file *one = malloc(sizeof *one);
-    if (!one) return run->store_err = PAL_ERR_MEMORY, false;
-    *one = *run->file;
-    one->study = *study;
-    memcpy(one->study.name, run->file->study.name, sizeof one->study.name);
-    one->study.point[0] = study->point[study->n_point - 1];
-    one->study.point[0].measured.front = false;
-    one->study.n_point = 1, one->n_total = n_total, one->whole = false;
-    run->store_err = pal_result_lines_put(run->lines, run->index, pal_study_file_tree(one), &run->store_diag);
+    run->store_err = pal_study_lines_put(run->lines, run->index, run->file, study, n_total, &run->store_diag);
     run->n_new++;
-    free(one);
     return !run->store_err && !pal_stop_asked();
 }
 
@@ -664,7 +585,9 @@ static pal_err work(study_run *run, int argc, char **argv, pal_diagnostic *diag)
     run->file->study.step_s = run->input.scene->step_s;
     take_command(run->file, argc, argv);
     PAL_TRY(use_old(run, &whole, diag));
-    if (run->shard.shard || run->shard.merge) PAL_TRY(open_results(run, diag));
+    if (run->shard.shard || run->shard.merge)
+        PAL_TRY(pal_study_lines_open(&run->shard, run->file, &run->lines, &run->old, diag));
+    if (run->lines && run->old) run->n_before = run->old->study.n_point, run->before = &run->old->study;
     if (run->shard.shard) return measure(run, diag);
     if (!whole) {
         if (run->folder) PAL_TRY(pal_scene_make_folder(run->folder, diag));
