@@ -471,7 +471,8 @@ int command_solve(int argc, char **argv)
          "a body without supports: refuse it, or balance the loads by its inertia (refuse)"},
         {"-o", "DIR", PAL_FLAG_TEXT, &args.folder, 0, 0, "write DIR/solution.csv and DIR/solution.vtk"},
         {"--csv", "FILE", PAL_FLAG_TEXT, &args.csv, 0, 0, "write x,y,z,ux,uy,uz of all nodes, m"},
-        {"--vtk", "FILE", PAL_FLAG_TEXT, &args.vtk, 0, 0, "write a legacy VTK file with displacement and stress"},
+        {"--vtk", "FILE", PAL_FLAG_TEXT, &args.vtk, 0, 0,
+         "write displacement and stress as a legacy VTK file, or XML where it ends with .vtu"},
         {"--plot", "FILE.svg", PAL_FLAG_TEXT, &args.plot, 0, 0,
          "plot error over nodes, and in FILE_seconds.svg error over seconds"},
     };
