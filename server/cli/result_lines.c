@@ -8,6 +8,7 @@
 #include <dirent.h>
 #include <errno.h>
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -274,6 +275,12 @@ bool pal_result_lines_own(const pal_result_lines *r, int index)
 const cJSON *pal_result_lines_find(const pal_result_lines *r, int index)
 {
     return cJSON_GetObjectItemCaseSensitive(r->line[index], "result");
+}
+
+double pal_result_number(const cJSON *result, const char *key)
+{
+    const cJSON *value = cJSON_GetObjectItemCaseSensitive(result, key);
+    return cJSON_IsNumber(value) ? value->valuedouble : NAN;
 }
 
 pal_err pal_result_lines_put(pal_result_lines *r, int index, cJSON *result, pal_diagnostic *diag)

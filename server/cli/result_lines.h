@@ -58,6 +58,8 @@ void pal_result_lines_close(pal_result_lines *lines); /* accepts NULL */
 bool pal_result_lines_own(const pal_result_lines *lines, int index);
 /* A result, borrowed until the close; NULL: not there yet. */
 const cJSON *pal_result_lines_find(const pal_result_lines *lines, int index);
+/* A number of a result; NaN: none. */
+double pal_result_number(const cJSON *result, const char *key);
 /* Appends a result, and takes it. Not after a merge. Errors: IO, MEMORY. */
 pal_err pal_result_lines_put(pal_result_lines *lines, int index, cJSON *result, pal_diagnostic *diag);
 #endif

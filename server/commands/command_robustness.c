@@ -76,15 +76,9 @@ static cJSON *stored_json(const pal_robustness_job *job, const pal_robustness_op
                     {"late", JSON_BOOL(job->report->late)}, {"report", job_json(job, options)});
 }
 
-static double number_of(const cJSON *o, const char *key)
-{
-    const cJSON *value = cJSON_GetObjectItemCaseSensitive(o, key);
-    return cJSON_IsNumber(value) ? value->valuedouble : NAN;
-}
-
 static int count_of(const cJSON *o, const char *key)
 {
-    const double value = number_of(o, key);
+    const double value = pal_result_number(o, key);
     return value >= 0 && value <= INT_MAX ? (int)value : 0;
 }
 
@@ -110,7 +104,7 @@ static pal_answer answer_of(const cJSON *o, const char *key)
 static bool result_read(const cJSON *o, pal_robustness_result *r)
 {
     const cJSON *s = cJSON_GetObjectItemCaseSensitive(o, "safeguards");
-    const double needs_s = number_of(o, "needs_s");
+    const double needs_s = pal_result_number(o, "needs_s");
     int verdict = 0, cause = 0;
     while (verdict < PAL_VERDICT_COUNT && strcmp(pal_verdict_name((pal_verdict)verdict), text_of(o, "verdict")))
         verdict++;
@@ -124,15 +118,15 @@ static bool result_read(const cJSON *o, pal_robustness_result *r)
                                  .recovered = answer_of(o, "recovered"),
                                  .finite = is_true(o, "finite"),
                                  .frozen = is_true(o, "stopped"),
-                                 .energy = number_of(o, "energy_excess"),
-                                 .limit = number_of(o, "energy_limit"),
-                                 .excluded_rise = number_of(o, "energy_excluded"),
-                                 .peak_contact_N = number_of(o, "peak_contact_N"),
-                                 .contact_cap_N = number_of(o, "contact_cap_N"),
-                                 .deviation_S = number_of(o, "deviation_S"),
-                                 .return_s = number_of(o, "returns_s"),
-                                 .simulated_s = number_of(o, "simulated_s"),
-                                 .took_s = number_of(o, "cpu_s"),
+                                 .energy = pal_result_number(o, "energy_excess"),
+                                 .limit = pal_result_number(o, "energy_limit"),
+                                 .excluded_rise = pal_result_number(o, "energy_excluded"),
+                                 .peak_contact_N = pal_result_number(o, "peak_contact_N"),
+                                 .contact_cap_N = pal_result_number(o, "contact_cap_N"),
+                                 .deviation_S = pal_result_number(o, "deviation_S"),
+                                 .return_s = pal_result_number(o, "returns_s"),
+                                 .simulated_s = pal_result_number(o, "simulated_s"),
+                                 .took_s = pal_result_number(o, "cpu_s"),
                                  .needs_s = needs_s > 0 ? needs_s : 0,
                                  .safeguards = {.n_capped = (uint64_t)count_of(s, "capped"),
                                                 .n_clamped = (uint64_t)count_of(s, "clamped"),
@@ -141,7 +135,7 @@ static bool result_read(const cJSON *o, pal_robustness_result *r)
                                                 .n_search = (uint64_t)count_of(s, "search"),
                                                 .n_tool_reset = (uint64_t)count_of(s, "tool_reset"),
                                                 .n_stopped = (uint64_t)count_of(s, "stopped"),
-                                                .ns = (uint64_t)fmax(0, number_of(s, "ns"))}};
+                                                .ns = (uint64_t)fmax(0, pal_result_number(s, "ns"))}};
     snprintf(r->diag, sizeof r->diag, "%s", text_of(o, "happened"));
     return verdict < PAL_VERDICT_COUNT;
 }
@@ -159,8 +153,8 @@ static bool stored_read(const cJSON *o, pal_robustness_job *job)
     snprintf(job->summary, sizeof job->summary, "%s", text_of(o, "summary"));
     report->driven = is_true(o, "driven"), report->late = is_true(o, "late"), report->rests = is_true(r, "rests");
     report->rest_inverted = count_of(r, "rest_inverted");
-    report->settle_s = number_of(r, "settle_s"), report->lowest_1_s = number_of(r, "lowest_1_s");
-    report->tau_s = number_of(r, "tau_s"), report->took_s = number_of(r, "cpu_s");
+    report->settle_s = pal_result_number(r, "settle_s"), report->lowest_1_s = pal_result_number(r, "lowest_1_s");
+    report->tau_s = pal_result_number(r, "tau_s"), report->took_s = pal_result_number(r, "cpu_s");
     cJSON_ArrayForEach(one, cJSON_GetObjectItemCaseSensitive(r, "cases"))
     {
         if (report->n == PAL_ROBUSTNESS_CASES_MAX || !result_read(one, &report->result[report->n])) return false;

@@ -121,6 +121,25 @@ run $beam --shard 1/2 --results parts --out three
 refused 2 'does not go with'
 end
 
+begin "solve: three shards equal one table but for seconds"
+table="solve $problems/beam.json --case tip --element hex8_bbar,tet10:8 --resolution 6,8,12"
+timed() { sed -E 's/"seconds":\{[^}]*\}//g' "$1"; }
+run $table --json
+check "exit code $code" code_is 0
+timed out >whole_table
+for i in 1 2 3; do
+    run $table --shard $i/3 --results rows
+    check "exit code $code of shard $i" code_is 0
+done
+check "the five rows are divided" [ "$(cat rows/solve-*-of-3.jsonl | grep -c '"index"')" -eq 5 ]
+run $table --merge rows --json
+check "exit code $code of the merge" code_is 0
+timed out >merged_table
+check "the merged table has other figures" same whole_table merged_table
+run $table --nu 0.3 --merge rows
+refused 1 'the results belong to other input'
+end
+
 if command -v mpirun >/dev/null 2>&1; then
     begin "robustness: ranks of mpirun equal one run"
     export OMPI_MCA_btl=self,vader OMPI_MCA_plm=isolated OMPI_MCA_oob_tcp_if_include=lo TMPDIR="$dir"
