@@ -303,7 +303,7 @@ typedef struct run_all {
     const char *table;       /* rewritten after each scene, so that a long run may be read, or ended, at any time */
     pal_result_lines *lines; /* of a shard or a merge; NULL: neither */
     pthread_mutex_t one_at_a_time;
-    pal_err write_err; /* of the table or the lines */
+    pal_err write_err; /* of the table or the lines, or of a scene whose result is not final */
     pal_diagnostic *diag;
 } run_all;
 
@@ -323,6 +323,13 @@ static pal_err open_generated(const pal_robustness_job *job, pal_loaded_scene **
                                        .cells = !strcmp(job->model, "cells"),
                                        .adaptive = !strcmp(job->model, "adaptive")};
     return pal_scene_generated(job->word, &options, out, diag);
+}
+
+/* a result, or an error that the same input gives again: a shard keeps it. A missing file or memory may be there next
+ * time */
+static bool is_final(pal_err err)
+{
+    return !err || err == PAL_ERR_REFUSED || err == PAL_ERR_BUDGET || err == PAL_ERR_NUMERIC || err == PAL_ERR_FROZEN;
 }
 
 /* one scene, on one worker */
@@ -349,9 +356,11 @@ static void run_job(void *user, int worker, int index)
     else
         pal_scene_input_close(&input);
     pthread_mutex_lock(&all->one_at_a_time);
-    job->done = job->err != PAL_ERR_STATE;
-    if (all->lines && job->done && !all->write_err)
-        all->write_err = pal_result_lines_put(all->lines, index, stored_json(job, all->options), all->diag);
+    job->done = true;
+    if (all->lines && !all->write_err)
+        all->write_err = is_final(job->err)
+                             ? pal_result_lines_put(all->lines, index, stored_json(job, all->options), all->diag)
+                             : pal_diagnostic_set(all->diag, job->err, "%s", job->diag.text);
     if (all->table && !all->write_err) all->write_err = write_table(all->table, all->job, all->n, all->diag);
     pthread_mutex_unlock(&all->one_at_a_time);
 }

@@ -55,6 +55,12 @@ check "the other shard is untouched" same plain/robustness-2-of-2.jsonl died/rob
 merges died
 end
 
+begin "robustness: a file that is missing now is no result"
+run robustness nowhere.json --shard 1/1 --results lost
+refused 1 'nowhere.json'
+check "the file has its head only" lines_are lost/robustness-1-of-1.jsonl 1
+end
+
 begin "shards that do not belong together are refused"
 run $organs --shard 3/2 --results plain
 refused 2 '3/2: shards are numbered from 1 to 2'
