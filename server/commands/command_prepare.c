@@ -28,8 +28,9 @@
 enum { PATH = 1200, TETGEN_MAX = 1000000, LABELS = 256, FILES = 64, SENTENCE = 160, RESOLUTION_MAX = 1024 };
 
 static const char about[] =
-    "Makes a scene from a surface (OBJ, STL, PLY, OFF) or a segmented scan (NIfTI .nii .nii.gz, INRIMAGE .inr\n"
-    ".inr.gz): tetrahedra (paper B section 2.2), skin, tissue, supports and tools. `palpate serve DIR/scene.json`\n"
+    "Makes a scene from a surface (OBJ, STL, PLY, OFF) or a segmented scan (NIfTI .nii .nii.gz, NRRD .nrrd,\n"
+    "MetaImage .mha, INRIMAGE .inr .inr.gz), as 3D Slicer exports them: tetrahedra (paper B section 2.2), skin,\n"
+    "tissue, supports and tools. `palpate serve DIR/scene.json`\n"
     "serves it. With --model adaptive the surface of a hollow organ carries springs and refines where it is\n"
     "touched (paper C).\n"
     "\n"

@@ -1,7 +1,9 @@
 /* `palpate robustness SCENE...`: the cases of server/robustness on scenes, what happened and whether that meets the
  * criterion. Exit code 1 when a case failed or could not be judged. Several scenes run in parallel, one on a core. */
+#include "server/base/hash.h"
 #include "server/base/team.h"
 #include "server/cli/report.h"
+#include "server/cli/result_lines.h"
 #include "server/commands/commands.h"
 #include "server/commands/robustness_table.h"
 #include "server/commands/scene_input.h"
@@ -10,6 +12,7 @@
 #include "server/robustness/robustness.h"
 #include "server/scene/scene_import.h"
 
+#include <limits.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdio.h>
@@ -61,6 +64,103 @@ static cJSON *job_json(const pal_robustness_job *job, const pal_robustness_optio
         {"slow", JSON_NUMBER(count[PAL_VERDICT_SLOW])}, {"collapsed", JSON_NUMBER(count[PAL_VERDICT_COLLAPSED])},
         {"failed", JSON_NUMBER(count[PAL_VERDICT_FAILED])}, {"undecided", JSON_NUMBER(count[PAL_VERDICT_UNDECIDED])},
         {"skipped", JSON_NUMBER(count[PAL_VERDICT_SKIPPED])}, {"cases", list});
+}
+
+/* ---- results of a shard: what --json prints of a scene, and what only the text says ---- */
+
+static cJSON *stored_json(const pal_robustness_job *job, const pal_robustness_options *options)
+{
+    if (job->err) return PAL_JSON({"err", JSON_NUMBER(job->err)}, {"error", JSON_TEXT(job->diag.text)});
+    return PAL_JSON({"title", JSON_TEXT(job->title)}, {"scene", JSON_TEXT(job->name)},
+                    {"summary", JSON_TEXT(job->summary)}, {"driven", JSON_BOOL(job->report->driven)},
+                    {"late", JSON_BOOL(job->report->late)}, {"report", job_json(job, options)});
+}
+
+static int count_of(const cJSON *o, const char *key)
+{
+    const double value = pal_result_number(o, key);
+    return value >= 0 && value <= INT_MAX ? (int)value : 0;
+}
+
+static bool is_true(const cJSON *o, const char *key)
+{
+    return cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(o, key));
+}
+
+/* "" where there is none; borrowed */
+static const char *text_of(const cJSON *o, const char *key)
+{
+    const char *text = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(o, key));
+    return text ? text : "";
+}
+
+static pal_answer answer_of(const cJSON *o, const char *key)
+{
+    const cJSON *value = cJSON_GetObjectItemCaseSensitive(o, key);
+    return cJSON_IsBool(value) ? (cJSON_IsTrue(value) ? PAL_YES : PAL_NO) : PAL_UNKNOWN;
+}
+
+/* the inverse of result_json, without the samples of the energy; borrows the texts. False: an unknown word */
+static bool result_read(const cJSON *o, pal_robustness_result *r)
+{
+    const cJSON *s = cJSON_GetObjectItemCaseSensitive(o, "safeguards");
+    const double needs_s = pal_result_number(o, "needs_s");
+    int verdict = 0, cause = 0;
+    while (verdict < PAL_VERDICT_COUNT && strcmp(pal_verdict_name((pal_verdict)verdict), text_of(o, "verdict")))
+        verdict++;
+    while (cause < PAL_CAUSE_NONE && strcmp(pal_cause_name((pal_cause)cause), text_of(o, "cause"))) cause++;
+    *r = (pal_robustness_result){.name = text_of(o, "name"),
+                                 .what = text_of(o, "what"),
+                                 .criterion = text_of(o, "criterion"),
+                                 .verdict = (pal_verdict)verdict,
+                                 .cause = (pal_cause)cause,
+                                 .safe = answer_of(o, "safe"),
+                                 .recovered = answer_of(o, "recovered"),
+                                 .finite = is_true(o, "finite"),
+                                 .frozen = is_true(o, "stopped"),
+                                 .energy = pal_result_number(o, "energy_excess"),
+                                 .limit = pal_result_number(o, "energy_limit"),
+                                 .excluded_rise = pal_result_number(o, "energy_excluded"),
+                                 .peak_contact_N = pal_result_number(o, "peak_contact_N"),
+                                 .contact_cap_N = pal_result_number(o, "contact_cap_N"),
+                                 .deviation_S = pal_result_number(o, "deviation_S"),
+                                 .return_s = pal_result_number(o, "returns_s"),
+                                 .simulated_s = pal_result_number(o, "simulated_s"),
+                                 .took_s = pal_result_number(o, "cpu_s"),
+                                 .needs_s = needs_s > 0 ? needs_s : 0,
+                                 .safeguards = {.n_capped = (uint64_t)count_of(s, "capped"),
+                                                .n_clamped = (uint64_t)count_of(s, "clamped"),
+                                                .n_mass_scaled = (uint64_t)count_of(s, "mass_scaled"),
+                                                .n_inversion = (uint64_t)count_of(s, "inverted"),
+                                                .n_search = (uint64_t)count_of(s, "search"),
+                                                .n_tool_reset = (uint64_t)count_of(s, "tool_reset"),
+                                                .n_stopped = (uint64_t)count_of(s, "stopped"),
+                                                .ns = (uint64_t)fmax(0, pal_result_number(s, "ns"))}};
+    snprintf(r->diag, sizeof r->diag, "%s", text_of(o, "happened"));
+    return verdict < PAL_VERDICT_COUNT;
+}
+
+/* the inverse of stored_json; false: not what this command writes */
+static bool stored_read(const cJSON *o, pal_robustness_job *job)
+{
+    const cJSON *r = cJSON_GetObjectItemCaseSensitive(o, "report"), *one;
+    pal_robustness_report *report = job->report;
+    job->done = true;
+    job->err = (pal_err)count_of(o, "err");
+    if (job->err) return pal_diagnostic_set(&job->diag, job->err, "%s", text_of(o, "error")) != PAL_ERR_OK;
+    snprintf(job->title, sizeof job->title, "%s", text_of(o, "title"));
+    snprintf(job->name, sizeof job->name, "%s", text_of(o, "scene"));
+    snprintf(job->summary, sizeof job->summary, "%s", text_of(o, "summary"));
+    report->driven = is_true(o, "driven"), report->late = is_true(o, "late"), report->rests = is_true(r, "rests");
+    report->rest_inverted = count_of(r, "rest_inverted");
+    report->settle_s = pal_result_number(r, "settle_s"), report->lowest_1_s = pal_result_number(r, "lowest_1_s");
+    report->tau_s = pal_result_number(r, "tau_s"), report->took_s = pal_result_number(r, "cpu_s");
+    cJSON_ArrayForEach(one, cJSON_GetObjectItemCaseSensitive(r, "cases"))
+    {
+        if (report->n == PAL_ROBUSTNESS_CASES_MAX || !result_read(one, &report->result[report->n])) return false;
+        report->count[report->result[report->n++].verdict]++;
+    }
+    return report->n > 0;
 }
 
 /* "-" where there is no number */
@@ -200,9 +300,10 @@ typedef struct run_all {
     pal_robustness_job *job;
     int n;
     const pal_robustness_options *options;
-    const char *table; /* rewritten after each scene, so that a long run may be read, or ended, at any time */
+    const char *table;       /* rewritten after each scene, so that a long run may be read, or ended, at any time */
+    pal_result_lines *lines; /* of a shard or a merge; NULL: neither */
     pthread_mutex_t one_at_a_time;
-    pal_err table_err;
+    pal_err write_err; /* of the table or the lines, or of a scene whose result is not final */
     pal_diagnostic *diag;
 } run_all;
 
@@ -224,6 +325,13 @@ static pal_err open_generated(const pal_robustness_job *job, pal_loaded_scene **
     return pal_scene_generated(job->word, &options, out, diag);
 }
 
+/* a result, or an error that the same input gives again: a shard keeps it. A missing file or memory may be there next
+ * time */
+static bool is_final(pal_err err)
+{
+    return !err || err == PAL_ERR_REFUSED || err == PAL_ERR_BUDGET || err == PAL_ERR_NUMERIC || err == PAL_ERR_FROZEN;
+}
+
 /* one scene, on one worker */
 static void run_job(void *user, int worker, int index)
 {
@@ -232,6 +340,7 @@ static void run_job(void *user, int worker, int index)
     pal_scene_input input = {0};
     pal_diagnostic reason = {""};
     (void)worker;
+    if (job->done || (all->lines && !pal_result_lines_own(all->lines, index))) return;
     job->err = job->model[0] ? open_generated(job, &input.loaded, &job->diag)
                              : pal_scene_input_open(job->word, &input, &job->diag);
     const pal_scene *scene = job->model[0] ? (input.loaded ? &input.loaded->scene : NULL) : input.studied.scene;
@@ -248,7 +357,11 @@ static void run_job(void *user, int worker, int index)
         pal_scene_input_close(&input);
     pthread_mutex_lock(&all->one_at_a_time);
     job->done = true;
-    if (all->table && !all->table_err) all->table_err = write_table(all->table, all->job, all->n, all->diag);
+    if (all->lines && !all->write_err)
+        all->write_err = is_final(job->err)
+                             ? pal_result_lines_put(all->lines, index, stored_json(job, all->options), all->diag)
+                             : pal_diagnostic_set(all->diag, job->err, "%s", job->diag.text);
+    if (all->table && !all->write_err) all->write_err = write_table(all->table, all->job, all->n, all->diag);
     pthread_mutex_unlock(&all->one_at_a_time);
 }
 
@@ -300,25 +413,74 @@ static bool known_models(const char *models)
     return known;
 }
 
-/* runs the jobs, in parallel where there are several */
-static pal_err run(pal_robustness_job *job, int n, const pal_robustness_options *options, const char *table,
-                   pal_diagnostic *diag)
+/* hash of the jobs, the options and the files that the words name */
+static uint64_t input_of(const pal_robustness_job *job, int n, const pal_robustness_options *options)
 {
-    run_all all = {job, n, options, table, PTHREAD_MUTEX_INITIALIZER, PAL_ERR_OK, diag};
+    char text[1400];
+    uint64_t hash = PAL_HASH_START;
+    int n_byte = snprintf(text, sizeof text, "%a %a %s", (double)options->seed, options->max_cpu_s,
+                          options->only ? options->only : "");
+    hash = pal_hash_bytes(hash, text, (size_t)n_byte);
+    for (int k = 0; k < n; k++) {
+        hash = pal_hash_bytes(hash, job[k].model, strlen(job[k].model) + 1);
+        hash = pal_result_input_file(hash, job[k].word);
+        snprintf(text, sizeof text, "%.1199s/scene.json", job[k].word);
+        if (!job[k].model[0]) hash = pal_result_input_file(hash, text);
+    }
+    return hash;
+}
+
+/* takes the results that are there; the lines of a merge hold all of them */
+static pal_err open_lines(run_all *all, const pal_shard_flags *flags, pal_diagnostic *diag)
+{
+    const pal_result_list list = {"robustness", input_of(all->job, all->n, all->options), all->n};
+    if (flags->merge) PAL_TRY(pal_result_lines_merge(flags->merge, &list, &all->lines, diag));
+    if (flags->merge) PAL_TRY(pal_result_lines_complete(all->lines, all->n, diag));
+    if (flags->shard) PAL_TRY(pal_result_lines_open(flags->folder, &list, flags->index, flags->n, &all->lines, diag));
+    for (int k = 0; k < all->n && all->lines; k++) {
+        const cJSON *result = pal_result_lines_find(all->lines, k);
+        if (result && !stored_read(result, &all->job[k]))
+            return PAL_REFUSE(diag, "%s: result %d is damaged", flags->merge ? flags->merge : flags->folder, k);
+    }
+    return PAL_ERR_OK;
+}
+
+/* runs the jobs that have no result yet, in parallel where there are several */
+static pal_err run(run_all *all, const pal_shard_flags *flags, pal_diagnostic *diag)
+{
     pal_team *team = NULL;
+    const int n = all->n;
     for (int k = 0; k < n; k++)
-        if (!(job[k].report = calloc(1, sizeof *job[k].report)))
+        if (!(all->job[k].report = calloc(1, sizeof *all->job[k].report)))
             return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for %d scenes", n);
+    PAL_TRY(open_lines(all, flags, diag));
     if (n > 1 && pal_team_create(0, &team))
         return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no workers for %d scenes", n);
     if (team)
-        pal_team_run(team, n, run_job, &all);
+        pal_team_run(team, n, run_job, all);
     else
-        run_job(&all, 0, 0);
+        run_job(all, 0, 0);
     pal_team_destroy(team);
-    if (n > 1 || !job[0].err) return all.table_err;
-    *diag = job[0].diag;
-    return job[0].err;
+    if (!all->write_err && flags->merge && all->table) all->write_err = write_table(all->table, all->job, n, all->diag);
+    if (n > 1 || all->lines || !all->job[0].err) return all->write_err;
+    *diag = all->job[0].diag;
+    return all->job[0].err;
+}
+
+/* what a shard did */
+static int report_shard(const pal_flag_common *common, const run_all *all, const pal_shard_flags *flags)
+{
+    int own = 0, refused = 0;
+    for (int k = 0; k < all->n; k++)
+        if (pal_result_lines_own(all->lines, k)) own++, refused += all->job[k].err != PAL_ERR_OK;
+    if (common->json)
+        return pal_report_json(common, PAL_JSON({"ok", JSON_BOOL(true)}, {"shard", JSON_NUMBER(flags->index)},
+                                                {"of", JSON_NUMBER(flags->n)}, {"results", JSON_NUMBER(own)},
+                                                {"refused", JSON_NUMBER(refused)}));
+    if (!common->quiet)
+        printf("shard %d of %d: %d of %d results are in %s, %d of them refused\n", flags->index, flags->n, own, all->n,
+               flags->folder, refused);
+    return 0;
 }
 
 static void print_jobs(const pal_robustness_job *job, int n)
@@ -356,6 +518,7 @@ int command_robustness(int argc, char **argv)
     static char about[4096];
     const char *picture = NULL, *only = NULL, *generate = NULL, *models = "springs,fem", *table_path = NULL;
     double seed = 1, seconds = 0;
+    pal_shard_flags shard = {0};
     const pal_flag flag[] = {
         {"--only", "NAME", PAL_FLAG_TEXT, &only, 0, 0, "run this case alone"},
         {"--generate", "ORGAN,...", PAL_FLAG_TEXT, &generate, 0, 0,
@@ -369,7 +532,14 @@ int command_robustness(int argc, char **argv)
         {"--seconds", "S", PAL_FLAG_NUMBER, &seconds, 0.1, 1e6,
          "processor time of all cases of a scene together (60, more where a step is expensive)"},
         {"--picture", "FILE.svg", PAL_FLAG_TEXT, &picture, 0, 0,
-         "one scene: plot the energy over time, one plot for each case"}};
+         "one scene: plot the energy over time, one plot for each case"},
+        {"--shard", "I/N", PAL_FLAG_TEXT, &shard.shard, 0, 0,
+         "run part I of N, from 1, of the scenes; started again it continues after its last stored scene"},
+        {"--results", "FOLDER", PAL_FLAG_TEXT, &shard.folder, 0, 0,
+         "where --shard keeps its results, a line for each scene"},
+        {"--merge", "FOLDER", PAL_FLAG_TEXT, &shard.merge, 0, 0,
+         "report the results of all shards in a folder, with the scenes and flags of their runs; only processor times\n"
+         "differ from a run without shards"}};
     int head = snprintf(
         about, sizeof about,
         "Runs the cases that are known to break simulations on scenes, one after another, and reports what\n"
@@ -382,7 +552,9 @@ int command_robustness(int argc, char **argv)
         .about = about,
         .example = "palpate prepare --shape sphere --resolution 6 --model fem -o ball\n"
                    "palpate robustness ball/scene.json --only meganewton --seconds 20\n"
-                   "palpate robustness --generate branched:5,lobed:7 --model fem --only inside --table inside.md\n",
+                   "palpate robustness --generate branched:5,lobed:7 --model fem --only inside --table inside.md\n"
+                   "palpate robustness --generate branched:5 --model fem --only inside --shard 1/1 --results shards\n"
+                   "palpate robustness --generate branched:5 --model fem --only inside --merge shards\n",
         PAL_FLAGS(flag),
         .operands = {0, JOBS / 2}};
     pal_flag_common common;
@@ -405,15 +577,27 @@ int command_robustness(int argc, char **argv)
         if (pal_organ_name_read(job[k].word, &family, &number, &diag))
             return pal_flags_wrong(&common, "--generate: %s", diag.text);
     }
+    if (pal_shard_flags_check(&shard, &diag)) return pal_flags_wrong(&common, "%s", diag.text);
+    if (picture && (shard.shard || shard.merge))
+        return pal_flags_wrong(&common, "--picture: does not go with --shard and --merge");
     if (picture && n > 1) return pal_flags_wrong(&common, "--picture: goes with one scene");
     pal_robustness_options options;
     pal_robustness_default(&options);
     options.seed = (uint64_t)seed, options.max_cpu_s = seconds, options.only = only;
     if (n == 1) options.progress = pal_report_continue, options.user = &common;
-    pal_err err = run(job, n, &options, table_path, &diag);
+    run_all all = {.job = job,
+                   .n = n,
+                   .options = &options,
+                   .table = shard.shard ? NULL : table_path,
+                   .one_at_a_time = PTHREAD_MUTEX_INITIALIZER,
+                   .diag = &diag};
+    pal_err err = run(&all, &shard, &diag);
     pal_report_progress(NULL, 0, &common);
     if (!err && picture) err = draw(job[0].report, job[0].title, picture, &diag);
-    code = err ? pal_report_refusal(&common, err, &diag) : report(&common, job, n, &options);
+    code = err           ? pal_report_refusal(&common, err, &diag)
+           : shard.shard ? report_shard(&common, &all, &shard)
+                         : report(&common, job, n, &options);
+    pal_result_lines_close(all.lines);
     for (int k = 0; k < n; k++) free(job[k].report);
     return code;
 }

@@ -396,7 +396,8 @@ static pal_err run_all(serve_run *run, const char *const *input, int n_input, pa
 }
 
 static const char about[] =
-    "Serves every scene (.json), surface (.obj .stl .ply .off), label volume (.nii .nii.gz .inr .inr.gz) or solid\n"
+    "Serves every scene (.json), surface (.obj .stl .ply .off), label volume (.nii .nii.gz .nrrd .mha .inr .inr.gz) or "
+    "solid\n"
     "of control cells (.palcells) as a session that browsers, haptic bridges and scripted clients share; without\n"
     "an input or --scenes a computed organ. Prints the address to open. Ends on SIGINT, SIGTERM or SIGHUP, or after\n"
     "--seconds.\n";

@@ -7,6 +7,7 @@
 #include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/commands/rendered_force.h"
+#include "server/commands/study_lines.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/json_reader.h"
 #include "server/study/studied_scene.h"
@@ -62,6 +63,9 @@ typedef struct study_run {
     pal_err store_err;       /* of the last write */
     pal_diagnostic store_diag;
     int picked; /* -1: none */
+    pal_shard_flags shard;
+    pal_result_lines *lines; /* of --shard or --merge; NULL: neither */
+    int index;               /* of the configuration that is being measured, with --shard */
     char written[MAX_PATH];
 } study_run;
 
@@ -176,7 +180,7 @@ static bool covers(const study_run *run)
 static pal_err read_old(study_run *run, pal_diagnostic *diag)
 {
     pal_study_request *q = &run->request;
-    bool exists = !access(run->path, F_OK);
+    bool exists = !run->shard.shard && !run->shard.merge && !access(run->path, F_OK);
     bool asks = run->row > 0 || run->target.max_error_m > 0 || run->target.budget_ms > 0;
     bool given = q->quick || q->seconds > 0 || q->load_case || q->samples;
     pal_diagnostic reason = {""};
@@ -256,6 +260,25 @@ static bool store(const pal_study *study, int n_total, void *user)
     run->store_err = pal_study_file_write(run->file, run->path, &run->store_diag);
     /* a stop after the last result is none */
     return !run->store_err && (!pal_stop_asked() || study->n_point == n_total);
+}
+
+/* ---- shards ---- */
+
+static bool own(int index, void *user)
+{
+    study_run *run = user;
+    run->index = index;
+    return pal_result_lines_own(run->lines, index);
+}
+
+/* appends the last point as a line */
+static bool store_line(const pal_study *study, int n_total, void *user)
+{
+    study_run *run = user;
+    if (pal_result_lines_find(run->lines, run->index)) return !pal_stop_asked();
+    run->store_err = pal_study_lines_put(run->lines, run->index, run->file, study, n_total, &run->store_diag);
+    run->n_new++;
+    return !run->store_err && !pal_stop_asked();
 }
 
 /* a line of the journal: hash and length = error, nodes; numbers; sentence */
@@ -360,7 +383,10 @@ static pal_err measure(study_run *run, pal_diagnostic *diag)
                            .progress = show,
                            .may_continue = may_continue,
                            .user = run};
-    pal_err err = out ? open_journal(run, diag) : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the study");
+    if (run->shard.shard) o.own = own, o.done = store_line;
+    if (run->shard.merge) o.recall = NULL, o.remember = NULL, o.done = NULL; /* nothing is left to measure */
+    pal_err err = !out ? PAL_ERR_MEMORY : run->shard.merge ? PAL_ERR_OK : open_journal(run, diag);
+    if (!out) pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the study");
     if (err) {
         free(out);
         return err;
@@ -520,6 +546,12 @@ static void print(const study_run *run)
     if (run->scene && run->picked >= 0) printf("palpate serve %s\n", run->scene);
 }
 
+static void print_shard(const study_run *run)
+{
+    printf("shard %d of %d: %d results are in %s, %d of them from before\n", run->shard.index, run->shard.n,
+           run->n_before + run->n_new, run->shard.folder, run->n_before);
+}
+
 static cJSON *as_json(const study_run *run)
 {
     char text[PAL_CONFIGURATION_TEXT], file[FILES][MAX_PATH];
@@ -542,6 +574,9 @@ static pal_err work(study_run *run, int argc, char **argv, pal_diagnostic *diag)
     if (run->scene) PAL_TRY(scene_path(run, diag));
     PAL_TRY(pal_study_stem(run->request.word, run->folder, run->stem, diag));
     snprintf(run->path, sizeof run->path, "%s.json", run->stem);
+    if (run->shard.shard)
+        snprintf(run->stem, sizeof run->stem, "%.1000s/study-%d-of-%d", run->shard.folder, run->shard.index,
+                 run->shard.n);
     PAL_TRY(read_old(run, diag));
     PAL_TRY(pal_study_input_open(&run->request, &run->input, diag));
     pal_study_input_describe(&run->input, &run->request, run->file);
@@ -550,6 +585,10 @@ static pal_err work(study_run *run, int argc, char **argv, pal_diagnostic *diag)
     run->file->study.step_s = run->input.scene->step_s;
     take_command(run->file, argc, argv);
     PAL_TRY(use_old(run, &whole, diag));
+    if (run->shard.shard || run->shard.merge)
+        PAL_TRY(pal_study_lines_open(&run->shard, run->file, &run->lines, &run->old, diag));
+    if (run->lines && run->old) run->n_before = run->old->study.n_point, run->before = &run->old->study;
+    if (run->shard.shard) return measure(run, diag);
     if (!whole) {
         if (run->folder) PAL_TRY(pal_scene_make_folder(run->folder, diag));
         pal_err err = measure(run, diag);
@@ -589,9 +628,10 @@ static int start(study_run *run, int argc, char **argv)
     pal_stop_watch();
     pal_err err = run->file ? work(run, argc, argv, &diag) : PAL_ERR_MEMORY;
     int code = pal_report_end(&run->common, err, &diag, err || !run->common.json ? NULL : as_json(run));
-    if (!err && !run->common.json && !run->common.quiet) print(run);
+    if (!err && !run->common.json && !run->common.quiet) (run->shard.shard ? print_shard : print)(run);
     pal_study_input_close(&run->input);
     pal_journal_close(run->journal);
+    pal_result_lines_close(run->lines);
     free(run->file);
     free(run->old);
     return code;
@@ -623,6 +663,13 @@ int command_study(int argc, char **argv)
         {"--seconds", "S", PAL_FLAG_NUMBER, &run.request.seconds, 0.01, 60, "simulated time of the first load (0.5)"},
         {"--quick", NULL, PAL_FLAG_SWITCH, &run.request.quick, 0, 0, "few configurations and a coarser reference"},
         {"--out", "FOLDER", PAL_FLAG_TEXT, &run.folder, 0, 0, "folder of the study's files (beside the scene)"},
+        {"--shard", "I/N", PAL_FLAG_TEXT, &run.shard.shard, 0, 0,
+         "measure part I of N, from 1, of the configurations; started again it continues after its last stored one"},
+        {"--results", "FOLDER", PAL_FLAG_TEXT, &run.shard.folder, 0, 0,
+         "where --shard keeps its results, a line for each configuration"},
+        {"--merge", "FOLDER", PAL_FLAG_TEXT, &run.shard.merge, 0, 0,
+         "write the study of all shards in a folder, with the input and flags of their runs. Errors equal those of a\n"
+         "run without shards to the bit; times, and what is chosen by them, are those measured"},
         {"--again", NULL, PAL_FLAG_SWITCH, &run.again, 0, 0, "start over instead of continuing"},
         {"--units", "UNIT", PAL_FLAG_TEXT, &unit, 0, 0, "unit of a surface file: m, cm, mm, um, in (guessed)"},
     };
@@ -639,6 +686,11 @@ int command_study(int argc, char **argv)
     if (code >= 0) return code;
     pal_diagnostic diag = {""};
     if (read_arguments(&run, within, budget, &diag)) return pal_flags_wrong(&run.common, "%s", diag.text);
+    if (pal_shard_flags_check(&run.shard, &diag)) return pal_flags_wrong(&run.common, "%s", diag.text);
+    if (run.shard.shard && (within || budget || run.row || run.folder || run.again))
+        return pal_flags_wrong(&run.common, "--shard: does not go with --within, --budget, --pick, --out and --again");
+    if (run.shard.merge && (run.row || run.again))
+        return pal_flags_wrong(&run.common, "--merge: does not go with --pick and --again");
     surface.unit_m = unit ? pal_mesh_unit_named(unit) : 0;
     if (unit && surface.unit_m == 0)
         return pal_flags_wrong(&run.common, "--units: \"%.40s\" is not m, cm, mm, um or in", unit);

@@ -95,8 +95,8 @@ pal_err pal_scene_folder_check(const char *path, pal_diagnostic *diag)
 
 static bool is_scene(const pal_scene_folder *folder, const char *name)
 {
-    static const char *const ends[] = {".json", ".palcells", ".obj",    ".stl", ".ply",
-                                       ".off",  ".nii",      ".nii.gz", ".inr", ".inr.gz"};
+    static const char *const ends[] = {".json", ".palcells", ".obj", ".stl",    ".ply",  ".off",
+                                       ".nii",  ".nii.gz",   ".inr", ".inr.gz", ".nrrd", ".mha"};
     char path[PATH_MAX];
     struct stat info;
     const size_t n = strlen(name);

@@ -37,8 +37,9 @@ static void report_progress(const pal_surface_scene *options, const char *what, 
 
 void pal_scene_stem(const char *path, char *out, size_t n_byte)
 {
-    static const char *const endings[] = {".gz",  ".nii", ".inr", ".obj", ".stl",     ".ply",     ".off",
-                                          ".OBJ", ".STL", ".PLY", ".OFF", ".palmesh", ".palcells"};
+    static const char *const endings[] = {".gz",  ".nii", ".inr",     ".seg.nrrd", ".nrrd", ".mha",
+                                          ".obj", ".stl", ".ply",     ".off",      ".OBJ",  ".STL",
+                                          ".PLY", ".OFF", ".palmesh", ".palcells"};
     const char *slash = strrchr(path, '/');
     snprintf(out, n_byte, "%s", slash ? slash + 1 : path);
     for (size_t k = 0; k < sizeof endings / sizeof endings[0]; k++) {

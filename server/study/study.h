@@ -95,6 +95,9 @@ typedef struct pal_study_options {
     const pal_samples *samples;         /* static reference of the first load; NULL: computed here */
     /* Points of an interrupted run; reused, not measured again. NULL: none. */
     const pal_study *before;
+    /* [load] Is configuration `index` of the sweep measured here, or by another process that has the same options?
+     * NULL: all are. Otherwise the times are not repeated and the front not tried, which needs all points. */
+    bool (*own)(int index, void *user);
     /* [load] Cache of reference answers, under a hash of configuration, load and points; answers of the same body,
      * loads and machine are not computed again. recall returns false and leaves value [n] unchanged if there is no
      * answer of that hash and length. Both may be NULL. */

@@ -80,16 +80,18 @@ static pal_err sweep(pal_study_job *job, const pal_study_entry *entry, int n)
 {
     const pal_study_options *o = job->options;
     for (int i = 0; i < n; i++) {
+        if (o->own && !o->own(i, o->user)) continue;
         char name[PAL_CONFIGURATION_TEXT];
+        pal_study_point *point = &job->out->point[job->out->n_point];
         const pal_study_point *old = known(o->before, &entry[i]);
         bool go =
             !o->progress || o->progress(pal_configuration_text(&entry[i].configuration, name), (double)i / n, o->user);
         if (!go) return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped after %d of %d configurations", i, n);
         if (old)
-            job->out->point[i] = *old;
+            *point = *old;
         else
-            PAL_TRY(pal_study_measure(job, &entry[i], &job->out->point[i]));
-        job->out->n_point = i + 1;
+            PAL_TRY(pal_study_measure(job, &entry[i], point));
+        job->out->n_point++;
         pal_study_mark_front(job->out);
         if (o->done && !o->done(job->out, n, o->user))
             return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped after %d of %d configurations", i + 1, n);
@@ -122,7 +124,10 @@ static pal_err study(pal_study_job *job)
     int n = err ? 0 : pal_study_list(job, entry);
     /* a continued sweep keeps its reference: with no point left to measure it is made only if that costs nothing */
     bool whole = n > 0 && !job->options->recall;
-    for (int i = 0; i < n && whole; i++) whole = known(before, &entry[i]) != NULL;
+    const bool part = job->options->own != NULL;
+    for (int i = 0; i < n && whole; i++)
+        whole = known(before, &entry[i]) || (part && !job->options->own(i, job->options->user));
+    whole = whole && before;
     if (!err && n == 0) err = PAL_REFUSE(job->diag, "no method of those asked for fits the body");
     if (whole) {
         pal_study *to = job->out;
@@ -133,9 +138,9 @@ static pal_err study(pal_study_job *job)
     if (!err && !whole) err = choose_probes(job);
     if (!err && !whole) err = job->n_load == 0 ? press(job) : pal_study_reference(job);
     if (!err) err = sweep(job, entry, n);
-    if (!err && !whole) err = pal_study_time_repeat(job);
+    if (!err && !whole && !part) err = pal_study_time_repeat(job);
     /* also if no point was left to measure: the interrupted run may have stopped here */
-    if (!err) err = pal_study_check_robustness(job);
+    if (!err && !part) err = pal_study_check_robustness(job);
     pal_study_predict(job->out);
     free(entry);
     return err;

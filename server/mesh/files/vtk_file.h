@@ -1,4 +1,5 @@
-/* Legacy VTK files: an unstructured grid of one kind of element with fields at nodes and cells. Thread: [load]. */
+/* Legacy VTK files and XML files (.vtu): an unstructured grid of one kind of element with fields at nodes and cells.
+ * Thread: [load]. */
 #ifndef PAL_MESH_FILES_VTK_FILE_H
 #define PAL_MESH_FILES_VTK_FILE_H
 #include "server/base/err.h"
@@ -25,4 +26,7 @@ typedef struct pal_vtk_grid {
 /* ASCII with 17 digits, a decimal point whatever the locale; whole file written or none; REFUSED (n_corner,
  * n_component), IO */
 pal_err pal_mesh_write_vtk(const char *path, const pal_vtk_grid *grid, pal_diagnostic *diag);
+/* The same as XML, which ParaView reads as a series (the title is left out). A path that ends with .vtu is written like
+ * this by pal_mesh_write_vtk too. */
+pal_err pal_mesh_write_vtu(const char *path, const pal_vtk_grid *grid, pal_diagnostic *diag);
 #endif

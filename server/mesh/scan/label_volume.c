@@ -1,4 +1,5 @@
-/* Label volumes from NIfTI-1 (.nii) and INRIMAGE-4 (.inr) files, plain or in gzip.
+/* Label volumes from NIfTI-1 (.nii) and INRIMAGE-4 (.inr) files, plain or in gzip, and from NRRD and MetaImage (.mha)
+ * files, whose voxels may be compressed behind a plain header.
  *
  * A compressed file is unpacked twice: first its beginning, to read the header, then piece by piece into labels. The
  * labels grow with the bytes that really come out, so a claimed size costs nothing, and the unpacked file is never held
@@ -9,6 +10,7 @@
 #include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/scalar_bytes.h"
 #include "server/mesh/files/text_scan.h"
+#include "server/mesh/scan/volume_header.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -19,15 +21,7 @@ static const size_t max_file = (size_t)4 << 30;
 /* a piece holds whole voxels of any type */
 enum { MAX_HEADER = 1 << 16, PIECE = 1 << 16, NIFTI_HEAD = 348 };
 
-/* fields of both headers */
-typedef struct header {
-    int64_t n[3];
-    double to_m[12], slope, shift; /* value = slope stored + shift */
-    size_t offset;                 /* of the first voxel           */
-    pal_scalar type;
-    bool big;
-    const char *format, *axes; /* axes "": not known */
-} header;
+typedef pal_volume_header header;
 
 typedef struct source {
     const char *name;
@@ -49,7 +43,7 @@ static bool is_gzip(const uint8_t *bytes, size_t n_byte)
     return n_byte >= 2 && bytes[0] == 0x1F && bytes[1] == 0x8B;
 }
 
-/* unpacks a file from its beginning; a plain file is passed through */
+/* unpacks a gzip or zlib stream from its beginning; a plain file is passed through */
 typedef struct unpacker {
     const source *s;
     z_stream z;
@@ -60,7 +54,7 @@ typedef struct unpacker {
 static pal_err unpack_begin(unpacker *u, const source *s)
 {
     *u = (unpacker){.s = s};
-    if (s->packed && inflateInit2(&u->z, 15 + 16) != Z_OK) return no_memory(s, sizeof u->z);
+    if (s->packed && inflateInit2(&u->z, 15 + 32) != Z_OK) return no_memory(s, sizeof u->z);
     return PAL_ERR_OK;
 }
 
@@ -364,6 +358,21 @@ static pal_err view_head(const source *s, uint8_t *room, size_t max, const uint8
     return err;
 }
 
+/* a header of text. Compressed voxels become the source themselves: positions in messages then count from their first
+ * byte */
+static pal_err
+text_header(source *s, pal_err (*read)(const char *, const uint8_t *, size_t, pal_volume_header *, pal_diagnostic *),
+            const uint8_t *head, size_t n_head, header *h)
+{
+    PAL_TRY(read(s->name, head, n_head, h, s->diag));
+    if (!axes_usable(h->to_m)) return REFUSE(s, "byte", 0, "the voxel axes are flat or not finite");
+    if (!h->packed) return PAL_ERR_OK;
+    if (s->packed) return REFUSE(s, "byte", 0, "the file is compressed twice");
+    s->bytes += h->offset, s->n_byte -= h->offset, s->packed = true;
+    h->offset = 0;
+    return PAL_ERR_OK;
+}
+
 pal_err pal_label_volume_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_label_volume *out,
                                pal_diagnostic *diag)
 {
@@ -380,8 +389,12 @@ pal_err pal_label_volume_parse(const char *name, const uint8_t *bytes, size_t n_
         err = nifti_header(&s, head, n_head, &h);
     else if (!err && is_inr(head, n_head))
         err = inr_header(&s, head, n_head, &h);
+    else if (!err && pal_is_nrrd(head, n_head))
+        err = text_header(&s, pal_nrrd_header, head, n_head, &h);
+    else if (!err && pal_is_metaimage(head, n_head))
+        err = text_header(&s, pal_metaimage_header, head, n_head, &h);
     else if (!err)
-        err = REFUSE(&s, "byte", 0, "neither NIfTI-1 nor INRIMAGE-4");
+        err = REFUSE(&s, "byte", 0, "neither NIfTI-1, NRRD, MetaImage nor INRIMAGE-4");
     return err ? err : read_voxels(&s, &h, out);
 }
 
@@ -403,7 +416,7 @@ void pal_label_volume_free(pal_label_volume *volume)
 
 bool pal_label_volume_is(const char *path)
 {
-    static const char *const tail[] = {".nii", ".nii.gz", ".inr", ".inr.gz"};
+    static const char *const tail[] = {".nii", ".nii.gz", ".inr", ".inr.gz", ".nrrd", ".mha"};
     for (size_t k = 0; k < sizeof tail / sizeof *tail; k++)
         if (pal_file_ends_with(path, tail[k])) return true;
     uint8_t bytes[4096], room[512];
@@ -413,5 +426,7 @@ bool pal_label_volume_is(const char *path)
     size_t n_head = fread(bytes, 1, sizeof bytes, file);
     fclose(file);
     source s = {.name = path, .bytes = bytes, .n_byte = n_head, .packed = is_gzip(bytes, n_head)};
-    return !view_head(&s, room, sizeof room, &head, &n_head) && (is_nifti(head, n_head) || is_inr(head, n_head));
+    return !view_head(&s, room, sizeof room, &head, &n_head) &&
+           (is_nifti(head, n_head) || is_inr(head, n_head) || pal_is_nrrd(head, n_head) ||
+            pal_is_metaimage(head, n_head));
 }

@@ -1,9 +1,11 @@
-/* Segmented scans: NIfTI-1 (.nii, .nii.gz) and INRIMAGE (.inr, .inr.gz) label volumes, and the smooth closed surface
- * of one label in metres. The bytes are untrusted: every count is checked against the bytes that are there, and a
- * compressed file may not unpack to more than the header's own size.
+/* Segmented scans: label volumes of NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, raw or gzip), MetaImage (.mha, plain or
+ * compressed) and INRIMAGE (.inr, .inr.gz), and the smooth closed surface of one label in metres. The bytes are
+ * untrusted: every count is checked against the bytes that are there, and a compressed file may not unpack to more than
+ * the header's own size.
  *
  * Axes: NIfTI's sform, else qform, else pixdim maps voxel indices to millimetres; INRIMAGE uses VX VY VZ (mm) and
- * VX index order x fastest. A mapping that mirrors keeps the surface's outward orientation. Thread: [load]. */
+ * VX index order x fastest. NRRD and MetaImage: volume_header.h; patient coordinates become those of NIfTI. A mapping
+ * that mirrors keeps the surface's outward orientation. Thread: [load]. */
 #ifndef PAL_MESH_SCAN_LABEL_VOLUME_H
 #define PAL_MESH_SCAN_LABEL_VOLUME_H
 #include "server/mesh/geometry/surface.h"
@@ -12,9 +14,9 @@ typedef struct pal_label_volume {
     int n[3];           /* voxels, x fastest                                     */
     double to_m[12];    /* 3x4 row-major: metres = to_m (i, j, k, 1), voxel centres */
     int32_t *label;     /* [n2][n1][n0]; non-integer voxels are rounded          */
-    int64_t first_byte; /* of the voxels in the file, unpacked                */
-    char format[16];    /* "nifti" | "inr"                                    */
-    char axes[4];       /* where x, y and z in metres point in the patient: "RAS" of a NIfTI with sform or qform; "":
+    int64_t first_byte; /* of the voxels in the file, or in what is unpacked   */
+    char format[16];    /* "nifti" | "inr" | "nrrd" | "metaimage"            */
+    char axes[4];       /* where x, y and z in metres point in the patient: "RAS" where the file states it; "":
                            not known */
 } pal_label_volume;
 
