@@ -2,8 +2,8 @@
  * list belongs to shard k mod N + 1 of N. A shard appends each result to its own file
  *
  *   FOLDER/COMMAND-I-of-N.jsonl
- *   {"format": "palpate-results-1", "command": "robustness", "input": "16 hex digits", "results": 12, "shard": 1, "of":
- * 4}
+ *   {"format": "palpate-results-1", "command": "robustness", "input": "16 hex digits",
+ *    "results": 12, "shard": 1, "of": 4}   (in one line)
  *   {"index": 0, "result": {...}}
  *
  * and synchronises it to the disk, so that a process that dies loses only the result it was computing. A shard started
