@@ -4,7 +4,6 @@
 #include "server/num/lowest_mode.h"
 #include "server/num/random.h"
 #include "server/sim/implicit/preconditioner.h"
-#include "server/sim/implicit/rest_stiffness.h"
 #include "server/sim/implicit/tuning.h"
 
 #include <limits.h>
@@ -17,8 +16,9 @@ typedef struct search {
     pal_block_matrix blocks; /* K + shift M at rest */
     bool assembled;          /* blocks give K v; else the components' tangents do */
     uint8_t *skip;           /* dofs that do not move [n_dof] */
-    pal_rest_preconditioner incomplete;
-    bool coarsens; /* multigrid in its place */
+    pal_rest_preconditioner own;
+    const pal_rest_preconditioner *incomplete; /* own, or found before */
+    bool coarsens;                             /* multigrid in its place */
     pal_node_rotations rotations;
     pal_preconditioner multigrid;
     double scale_1_s2; /* of the order of the square of the highest frequency */
@@ -54,7 +54,7 @@ static void precondition(void *user, const double *r, double *out)
     if (s->coarsens)
         pal_preconditioner_solve(&s->multigrid, r, out);
     else
-        pal_rest_preconditioner_solve(&s->incomplete, r, out);
+        pal_rest_preconditioner_solve(s->incomplete, r, out);
 }
 
 /* ---- the search ---- */
@@ -91,13 +91,19 @@ static pal_err coarsen(search *s, const pal_build *build)
 }
 
 /* K, what multiplies with it, and the preconditioner */
-static pal_err prepare(search *s, const pal_build *build, bool tangents)
+static pal_err prepare(search *s, const pal_build *build, const pal_rest_values *rest, bool tangents)
 {
     pal_err err = tangents ? coarsen(s, build) : PAL_ERR_REFUSED;
     if (err != PAL_ERR_REFUSED) return err;
+    if (rest && rest->blocks.value) {
+        s->assembled = true, s->blocks = rest->blocks, s->incomplete = rest->preconditioner;
+        s->scale_1_s2 = pal_rest_stiffness_scale_1_s2(s->body, &s->blocks, s->skip);
+        return PAL_ERR_OK;
+    }
     PAL_TRY(assemble(s, build, tangents));
     s->scale_1_s2 = pal_rest_stiffness_scale_1_s2(s->body, &s->blocks, s->skip);
-    return pal_rest_preconditioner_make(s->body, &s->blocks, s->skip, build->arena, &s->incomplete);
+    s->incomplete = &s->own;
+    return pal_rest_preconditioner_make(s->body, &s->blocks, s->skip, build->arena, &s->own);
 }
 
 /* five digits: damping and sleep, which follow from the frequency, are then the same with every library that factors */
@@ -107,7 +113,7 @@ static double round_digits(double w_1_s)
     return digit * nearbyint(w_1_s / digit);
 }
 
-static pal_err find(search *s, const pal_build *build, double *mode)
+static pal_err find(search *s, const pal_build *build, const pal_rest_values *rest, double *mode)
 {
     pal_body *body = s->body;
     /* elements under an explicit solver are not made to linearise */
@@ -127,7 +133,7 @@ static pal_err find(search *s, const pal_build *build, double *mode)
                          .work = PAL_NEW(build->arena, double, 9 * n)};
     if (!s->skip || !m.x || !m.work) return PAL_ERR_MEMORY;
     for (int i = 0; i < body->n_dof; i++) s->skip[i] = body->support[i] || (body->active && !(body->mass_kg[i] > 0));
-    PAL_TRY(prepare(s, build, tangents));
+    PAL_TRY(prepare(s, build, rest, tangents));
     for (size_t i = 0; i < n; i++) m.work[i] = pal_random_unit(7, i) - 0.5;
     multiply_mass(s, m.work, m.work + n);
     precondition(s, m.work + n, m.x);
@@ -138,7 +144,7 @@ static pal_err find(search *s, const pal_build *build, double *mode)
     return PAL_ERR_OK;
 }
 
-pal_err pal_lowest_frequency_find(const pal_build *build, double *mode)
+pal_err pal_lowest_frequency_find(const pal_build *build, const pal_rest_values *rest, double *mode)
 {
     pal_arena *arena = pal_arena_create(1 << 20, true);
     if (!arena) return PAL_ERR_MEMORY;
@@ -146,8 +152,8 @@ pal_err pal_lowest_frequency_find(const pal_build *build, double *mode)
     pal_build own = *build;
     own.arena = arena, own.diag = NULL;
     build->body->lowest_1_s = build->body->lowest_error = 0;
-    pal_err err = find(&s, &own, mode);
-    pal_rest_preconditioner_destroy(&s.incomplete);
+    pal_err err = find(&s, &own, rest, mode);
+    pal_rest_preconditioner_destroy(&s.own);
     pal_preconditioner_destroy(&s.multigrid);
     pal_arena_destroy(arena);
     /* without a preconditioner, or beyond the bounded work, it is not known */

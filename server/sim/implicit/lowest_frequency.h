@@ -6,10 +6,10 @@
  * and shape (num/lowest_mode.h). Thread: [load], or [sim] between steps: it takes heap memory. */
 #ifndef PAL_SIM_IMPLICIT_LOWEST_FREQUENCY_H
 #define PAL_SIM_IMPLICIT_LOWEST_FREQUENCY_H
-#include "server/sim/core/effect.h"
+#include "server/sim/implicit/rest_stiffness.h"
 
 /* Fills lowest_1_s and lowest_error of the body that build->made [n_made] belong to; both 0: not known, because part of
  * the body moves as a rigid one, or the work would be too much. The body is at rest. mode: its mode, of mass 1 kg m^2
- * [n_dof][3]; NULL: not asked for. MEMORY */
-pal_err pal_lowest_frequency_find(const pal_build *build, double *mode);
+ * [n_dof][3]; NULL: not asked for. rest: the stiffness where it has been found already; NULL: it has not. MEMORY */
+pal_err pal_lowest_frequency_find(const pal_build *build, const pal_rest_values *rest, double *mode);
 #endif

@@ -13,6 +13,13 @@ typedef struct pal_rest_preconditioner {
     pal_rigid_clusters clusters;
 } pal_rest_preconditioner;
 
+/* the stiffness at rest and its preconditioner, for all that want them while a body is loaded */
+typedef struct pal_rest_values {
+    pal_block_matrix blocks; /* in `work` but for the pattern; value NULL: not found */
+    const pal_rest_preconditioner *preconditioner;
+    pal_arena *work; /* whoever has the struct destroys it */
+} pal_rest_values;
+
 /* body at rest. BUDGET: its elements are not known or they are too many (PAL_PROBE_WORK_MAX); MEMORY */
 pal_err pal_rest_stiffness_find(const pal_system *system, pal_arena *arena, pal_block_matrix *out);
 /* largest of diagonal over mass: of the order of the square of the highest frequency, 1/s^2 */

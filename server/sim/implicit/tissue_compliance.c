@@ -233,33 +233,28 @@ static void destroy(void *self)
     pal_rest_preconditioner_destroy(&((pal_tissue_compliance *)self)->preconditioner);
 }
 
-/* the preconditioner of the stiffness at rest, which stands in `work` with its values */
-static pal_err factor_rest(pal_tissue_compliance *tissue, const pal_system *system, pal_arena *arena, pal_arena *work)
+/* for a body whose nodes are its dofs and stay. The factor goes on with the pattern; the values stay in rest->work */
+static pal_err make_preconditioner(pal_tissue_compliance *tissue, const pal_system *system, pal_arena *arena,
+                                   pal_rest_values *rest)
 {
-    const pal_body *body = system->body;
-    pal_block_matrix *rest = &tissue->rest;
-    PAL_TRY(pal_rest_stiffness_find(system, work, rest));
-    const size_t n_start = (size_t)rest->n + 1, n_row = (size_t)rest->start[rest->n];
+    rest->work = pal_arena_create(1 << 20, true);
+    if (!rest->work) return PAL_ERR_MEMORY;
+    pal_block_matrix *blocks = &tissue->rest; /* borrowed by the preconditioner */
+    PAL_TRY(pal_rest_stiffness_find(system, rest->work, blocks));
+    const size_t n_start = (size_t)blocks->n + 1, n_row = (size_t)blocks->start[blocks->n];
     int32_t *start = PAL_NEW(arena, int32_t, n_start), *row = PAL_NEW(arena, int32_t, n_row);
     if (!start || !row) return PAL_ERR_MEMORY;
-    memcpy(start, rest->start, n_start * sizeof *start);
-    memcpy(row, rest->row, n_row * sizeof *row);
-    rest->start = start, rest->row = row;
-    return pal_rest_preconditioner_make(body, rest, body->support, arena, &tissue->preconditioner);
-}
-
-/* for a body whose nodes are its dofs and stay. The factor goes on with the pattern; the values are let go */
-static pal_err make_preconditioner(pal_tissue_compliance *tissue, const pal_system *system, pal_arena *arena)
-{
-    pal_arena *work = pal_arena_create(1 << 20, true);
-    if (!work) return PAL_ERR_MEMORY;
-    const pal_err err = factor_rest(tissue, system, arena, work);
-    tissue->rest.value = NULL;
-    pal_arena_destroy(work);
+    memcpy(start, blocks->start, n_start * sizeof *start);
+    memcpy(row, blocks->row, n_row * sizeof *row);
+    blocks->start = start, blocks->row = row;
+    const uint8_t *support = system->body->support;
+    pal_err err = pal_rest_preconditioner_make(system->body, blocks, support, arena, &tissue->preconditioner);
+    if (!err) rest->blocks = *blocks, rest->preconditioner = &tissue->preconditioner;
+    blocks->value = NULL;
     return err;
 }
 
-pal_err pal_tissue_compliance_make(const pal_build *build)
+pal_err pal_tissue_compliance_make(const pal_build *build, pal_rest_values *rest)
 {
     pal_body *body = build->body;
     pal_arena *arena = build->body_arena ? build->body_arena : build->arena;
@@ -277,7 +272,7 @@ pal_err pal_tissue_compliance_make(const pal_build *build)
     if (!made) return PAL_ERR_MEMORY;
     if (!body->interpolation && !body->active) {
         PAL_TRY(pal_system_make(build, &system));
-        pal_err err = make_preconditioner(tissue, &system, arena);
+        pal_err err = make_preconditioner(tissue, &system, arena, rest);
         if (err == PAL_ERR_MEMORY) pal_rest_preconditioner_destroy(&tissue->preconditioner);
         if (err == PAL_ERR_MEMORY) return err;
         tissue->preconditioned = err == PAL_ERR_OK;

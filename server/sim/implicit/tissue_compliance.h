@@ -40,6 +40,6 @@ typedef struct pal_tissue_compliance {
 } pal_tissue_compliance;
 
 /* Sets build->body->compliance; build->made: all components but the solver, the body at rest. Whoever frees the body
- * calls its destroy. MEMORY. [load] */
-pal_err pal_tissue_compliance_make(const pal_build *build);
+ * calls its destroy. rest, zero before: the stiffness that it has found. MEMORY. [load] */
+pal_err pal_tissue_compliance_make(const pal_build *build, pal_rest_values *rest);
 #endif

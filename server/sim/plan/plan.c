@@ -81,7 +81,7 @@ static pal_err explain(const pal_plan_requests *s, pal_component *list, int n_co
 
 /* The lowest frequency of a body that moves by itself, where damping or sleep follow from it; then its drag. list: all
  * but the solver [n] */
-static pal_err find_damping(pal_plan_requests *s, pal_component *list, int n)
+static pal_err find_damping(pal_plan_requests *s, pal_component *list, int n, const pal_rest_values *rest)
 {
     pal_body *body = s->build.body;
     pal_material material = s->build.def->material;
@@ -90,8 +90,7 @@ static pal_err find_damping(pal_plan_requests *s, pal_component *list, int n)
         wanted |= s->request[i].effect->sleep.wakes != NULL;
         moves &= strcmp(s->request[i].effect->name, "static_newton") != 0;
     }
-    s->build.made = list, s->build.n_made = n;
-    if (wanted && moves) PAL_TRY(pal_lowest_frequency_find(&s->build, NULL));
+    if (wanted && moves) PAL_TRY(pal_lowest_frequency_find(&s->build, rest, NULL));
     const double rate_1_s = pal_material_damping_1_s(&material, body->lowest_1_s);
     const bool other = rate_1_s != pal_material_damping_1_s(&material, 0);
     material.damping_1_s = rate_1_s;
@@ -101,6 +100,18 @@ static pal_err find_damping(pal_plan_requests *s, pal_component *list, int n)
             PAL_TRY(list[i].effect->material(list[i].self, body, &material, s->build.diag));
     body->damping_1_s = pal_guard_drag_1_s(list, n);
     return PAL_ERR_OK;
+}
+
+/* what follows from all components of a body but its solver: compliance and damping */
+static pal_err find_properties(pal_plan_requests *s, pal_component *list, int n)
+{
+    pal_rest_values rest = {.work = NULL};
+    pal_err err = PAL_ERR_OK;
+    s->build.made = list, s->build.n_made = n;
+    if (s->build.body->wants_compliance && !s->build.body->implicit) err = pal_tissue_compliance_make(&s->build, &rest);
+    if (!err) err = find_damping(s, list, n, &rest);
+    pal_arena_destroy(rest.work);
+    return err;
 }
 
 static pal_err make_components(pal_plan_requests *s, pal_component *list, int *n_component)
@@ -122,9 +133,7 @@ static pal_err make_components(pal_plan_requests *s, pal_component *list, int *n
     /* the OUTPUT component first: its make says what the body shows, which is what tools touch; the SOLVE component
      * last: the others have said what they want of it */
     for (int pass = 0; pass < 3; pass++) {
-        if (pass == 2) PAL_TRY(find_damping(s, list + first, *n_component - first));
-        if (pass == 2 && s->build.body->wants_compliance && !s->build.body->implicit)
-            PAL_TRY(pal_tissue_compliance_make(&s->build));
+        if (pass == 2) PAL_TRY(find_properties(s, list + first, *n_component - first));
         for (int i = 0; i < s->n_request; i++) {
             pal_stage stage = s->request[i].effect->stage;
             if (pass != (stage == PAL_STAGE_OUTPUT ? 0 : stage == PAL_STAGE_SOLVE ? 2 : 1)) continue;

@@ -184,7 +184,7 @@ static pal_err change(pal_plan *plan, pal_plan_requests *s, int b, int request, 
     /* another stiffness; a damping that was derived stays */
     s->build.made = plan->component + plan->first[PAL_STAGE_FORCE][b], s->build.n_made = plan->n_of[PAL_STAGE_FORCE][b];
     const bool stiff = effect->stage == PAL_STAGE_FORCE && (effect->internal || effect->tangent) && !effect->drag;
-    if (!err && stiff && body->lowest_1_s > 0) err = pal_lowest_frequency_find(&s->build, NULL);
+    if (!err && stiff && body->lowest_1_s > 0) err = pal_lowest_frequency_find(&s->build, NULL, NULL);
     PAL_ASSERT(s->build.scratch_byte <= plan->scratch_byte);
     restore(body, saved);
     /* a guard knows the state of now as its last good one */

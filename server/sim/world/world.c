@@ -301,7 +301,7 @@ pal_err pal_world_find_lowest(pal_world *world, int body, double *mode)
     const pal_build build = {.body = &plan->body[body],
                              .made = plan->component + plan->first[PAL_STAGE_FORCE][body],
                              .n_made = plan->n_of[PAL_STAGE_FORCE][body]};
-    PAL_TRY(pal_lowest_frequency_find(&build, mode));
+    PAL_TRY(pal_lowest_frequency_find(&build, NULL, mode));
     pal_world_keep_lowest(world, body);
     return PAL_ERR_OK;
 }
