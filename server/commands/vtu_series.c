@@ -4,6 +4,7 @@
 #include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/vtk_file.h"
 #include "server/scene/scene_file.h"
+#include "server/scene/scene_import.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -81,7 +82,7 @@ static pal_err write_body(const pal_vtu_series *s, const char *file, const pal_w
 pal_err pal_vtu_series_step(pal_vtu_series *s, const pal_world *world, pal_diagnostic *diag)
 {
     const double now = pal_world_time_s(world);
-    char file[PAL_NAME + 24];
+    char name[PAL_NAME], file[PAL_NAME + 40];
     /* a rounding of the sum of steps does not delay a moment by a step */
     if (now < s->next_s - 1e-9) return PAL_ERR_OK;
     if (s->n_moment == 0) PAL_TRY(pal_scene_make_folder(s->folder, diag));
@@ -91,9 +92,11 @@ pal_err pal_vtu_series_step(pal_vtu_series *s, const pal_world *world, pal_diagn
     for (int k = 0; k < pal_world_body_count(world); k++) {
         const pal_body *b = pal_world_view_body(world, k);
         if (!b->element && (!b->tets || b->tets->n_tet == 0)) continue;
-        snprintf(file, sizeof file, "%.*s_%06d.vtu", PAL_NAME - 1, b->name, s->n_moment);
+        /* the name of a body is any text, that of a file has no path and no sign of XML; two bodies may share it */
+        pal_scene_plain_name(b->name, "body", name);
+        snprintf(file, sizeof file, "%s_%d_%06d.vtu", name, k + 1, s->n_moment);
         PAL_TRY(write_body(s, file, world, b, diag));
-        fprintf(s->to, "<DataSet timestep=\"%.9g\" part=\"%d\" name=\"%s\" file=\"%s\"/>\n", now, k, b->name, file);
+        fprintf(s->to, "<DataSet timestep=\"%.9g\" part=\"%d\" name=\"%s\" file=\"%s\"/>\n", now, k, name, file);
         s->n_file++;
     }
     s->n_moment++;

@@ -1,6 +1,7 @@
-/* Bodies of a running world as a series of files for ParaView: FOLDER/BODY_NNNNNN.vtu with the deformed elements at an
- * interval of simulated time, and FOLDER/series.pvd, which names all of them with their times. Bodies without elements
- * of volume are left out.
+/* Bodies of a running world as a series of files for ParaView: FOLDER/NAME_BODY_MOMENT.vtu with the deformed elements
+ * at an interval of simulated time, and FOLDER/series.pvd, which names all of them with their times. NAME is the body's
+ * name in the characters a-z 0-9 _ -, BODY its number in the scene from 1. Bodies without elements of volume are left
+ * out.
  *
  * Points: position, scene frame, m. At points: displacement_m, velocity_m_s and the fields that the model gives:
  * von_mises_Pa, energy_J_m3, stiffness_J, strain, distortion, young_Pa, density_kg_m3, means over the elements around

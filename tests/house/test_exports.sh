@@ -30,12 +30,17 @@ begin "a recording becomes a series for ParaView"
 run prepare --procedural --resolution 8 --model fem -o organ
 check "exit code $code of prepare" code_is 0
 young=$(sed -n 's/.*"young_Pa":[[:space:]]*\([0-9.e+]*\).*/\1/p' organ/scene.json | head -n 1)
+# the name of a body is any text: no file may leave the folder, and none of XML's signs its place
+sed '/"bodies"/,$ s/"name":[[:space:]]*"organ"/"name": "..\/..\/escape <\&\x27>"/' organ/scene.json >organ/named.json
+check "the body has a name with a path" grep -q '"../../escape' organ/named.json
+mv organ/named.json organ/scene.json
 run serve organ/scene.json --record organ.log --port 0 --seconds 0.5
 check "exit code $code of serve" code_is 0
 run replay organ.log organ/scene.json --vtu series --rate 10
 check "exit code $code of replay" code_is 0
 check "it says where" has out "series/series.pvd"
 check "VTK reads another body" reads series series "$young"
+check "the folder has all files" test "$(ls series/*escape*_1_000000.vtu | wc -l)" = 1
 end
 
 begin "a recording of a surface has no elements to write"
