@@ -283,6 +283,7 @@ static pal_err meta_entry(const reader *r, entries *e, pal_volume_header *h)
     const char *key = r->key;
     if (!strcasecmp(key, "NDims")) return e->has_dimension = true, only(r, 3, "axes");
     if (!strcasecmp(key, "ElementNumberOfChannels")) return only(r, 1, "values in a voxel");
+    if (!strcasecmp(key, "HeaderSize")) return only(r, 0, "bytes before the voxels (HeaderSize)");
     if (!strcasecmp(key, "DimSize")) return e->has_size = true, read_sizes(r, h->n);
     if (!strcasecmp(key, "ElementType")) return e->has_type = true, read_type(r, meta_type, &h->type);
     if (!strcasecmp(key, "ElementSpacing")) return e->has_spacing = true, need_numbers(r, e->spacing, 3);

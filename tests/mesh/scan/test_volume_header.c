@@ -146,6 +146,7 @@ static void hostile_headers_are_refused_with_their_line(void)
     refused("ObjectType = Image\nNDims = 2\n", "x: line 2: 2 axes, 3 is read");
     refused("ObjectType = Image\nElementType = MET_STRING\n", "voxel type \"MET_STRING\" is not read");
     refused("ObjectType = Image\nNDims = 3\nElementDataFile = LOCAL\n", "the header ends without DimSize");
+    refused("ObjectType = Image\nHeaderSize = 348\n", "348 bytes before the voxels (HeaderSize), 0 is read");
     refused("ObjectType = Image\nElementNumberOfChannels = 3\n", "3 values in a voxel, 1 is read");
 }
 
