@@ -11,7 +11,7 @@
  */
 #ifndef PAL_CLI_RESULT_LINES_H
 #define PAL_CLI_RESULT_LINES_H
-#include "server/base/err.h"
+#include "server/base/flags.h"
 
 #include <cjson/cJSON.h>
 
@@ -34,6 +34,22 @@ typedef struct pal_shard_flags {
     const char *shard, *folder, *merge; /* --shard, --results, --merge; NULL: absent */
     int index, n;                       /* I and N of --shard, by the check */
 } pal_shard_flags;
+/* their rows in its table of flags, of a pal_shard_flags; row: what one result is */
+#define PAL_SHARD_FLAGS(flags, row)                                                                                    \
+    {"--shard",                                                                                                        \
+     "I/N",                                                                                                            \
+     PAL_FLAG_TEXT,                                                                                                    \
+     &(flags).shard,                                                                                                   \
+     0,                                                                                                                \
+     0,                                                                                                                \
+     "compute part I of N, from 1, of the results, each a " row "; started again it continues after the last stored"}, \
+        {"--results", "FOLDER", PAL_FLAG_TEXT, &(flags).folder, 0, 0, "where --shard keeps them, a line each"},        \
+    {                                                                                                                  \
+        "--merge", "FOLDER", PAL_FLAG_TEXT, &(flags).merge, 0, 0,                                                      \
+            "report the results of all shards in a folder, with the input and flags of their runs. Only measured "     \
+            "times,\n"                                                                                                 \
+            "and what is chosen by them, differ from a run without shards"                                             \
+    }
 /* Reads --shard. Errors: REFUSED: flags that do not go together, or no I/N. */
 pal_err pal_shard_flags_check(pal_shard_flags *flags, pal_diagnostic *diag);
 /* Reads "I/N" with 1 <= I <= N <= PAL_SHARDS_MAX. Errors: REFUSED. */
@@ -54,7 +70,7 @@ pal_err pal_result_lines_merge(const char *folder, const pal_result_list *list, 
 pal_err pal_result_lines_complete(const pal_result_lines *lines, int n, pal_diagnostic *diag);
 void pal_result_lines_close(pal_result_lines *lines); /* accepts NULL */
 
-/* Belongs the result to this shard? After a merge: always. */
+/* Does the result belong to this shard? After a merge: always. */
 bool pal_result_lines_own(const pal_result_lines *lines, int index);
 /* A result, borrowed until the close; NULL: not there yet. */
 const cJSON *pal_result_lines_find(const pal_result_lines *lines, int index);

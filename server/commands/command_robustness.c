@@ -417,10 +417,10 @@ static bool known_models(const char *models)
 static uint64_t input_of(const pal_robustness_job *job, int n, const pal_robustness_options *options)
 {
     char text[1400];
-    uint64_t hash = PAL_HASH_START;
-    int n_byte = snprintf(text, sizeof text, "%a %a %s", (double)options->seed, options->max_cpu_s,
-                          options->only ? options->only : "");
-    hash = pal_hash_bytes(hash, text, (size_t)n_byte);
+    const char *only = options->only ? options->only : "";
+    int n_byte = snprintf(text, sizeof text, "%a %a", (double)options->seed, options->max_cpu_s);
+    uint64_t hash = pal_hash_bytes(PAL_HASH_START, text, (size_t)n_byte + 1);
+    hash = pal_hash_bytes(hash, only, strlen(only) + 1);
     for (int k = 0; k < n; k++) {
         hash = pal_hash_bytes(hash, job[k].model, strlen(job[k].model) + 1);
         hash = pal_result_input_file(hash, job[k].word);
@@ -533,13 +533,7 @@ int command_robustness(int argc, char **argv)
          "processor time of all cases of a scene together (60, more where a step is expensive)"},
         {"--picture", "FILE.svg", PAL_FLAG_TEXT, &picture, 0, 0,
          "one scene: plot the energy over time, one plot for each case"},
-        {"--shard", "I/N", PAL_FLAG_TEXT, &shard.shard, 0, 0,
-         "run part I of N, from 1, of the scenes; started again it continues after its last stored scene"},
-        {"--results", "FOLDER", PAL_FLAG_TEXT, &shard.folder, 0, 0,
-         "where --shard keeps its results, a line for each scene"},
-        {"--merge", "FOLDER", PAL_FLAG_TEXT, &shard.merge, 0, 0,
-         "report the results of all shards in a folder, with the scenes and flags of their runs; only processor times\n"
-         "differ from a run without shards"}};
+        PAL_SHARD_FLAGS(shard, "scene")};
     int head = snprintf(
         about, sizeof about,
         "Runs the cases that are known to break simulations on scenes, one after another, and reports what\n"

@@ -593,13 +593,7 @@ int command_solve(int argc, char **argv)
          "write displacement and stress as a legacy VTK file, or XML where it ends with .vtu"},
         {"--plot", "FILE.svg", PAL_FLAG_TEXT, &args.plot, 0, 0,
          "plot error over nodes, and in FILE_seconds.svg error over seconds"},
-        {"--shard", "I/N", PAL_FLAG_TEXT, &args.shard.shard, 0, 0,
-         "solve part I of N, from 1, of the table; started again it continues after its last stored row"},
-        {"--results", "FOLDER", PAL_FLAG_TEXT, &args.shard.folder, 0, 0,
-         "where --shard keeps its results, a line for each row"},
-        {"--merge", "FOLDER", PAL_FLAG_TEXT, &args.shard.merge, 0, 0,
-         "the table of all shards in a folder, with the input and flags of their runs; only seconds differ from a run\n"
-         "without shards"},
+        PAL_SHARD_FLAGS(args.shard, "row of the table"),
     };
     const pal_flag_table flags = {.usage = "solve PROBLEM.json --case ID [flags]",
                                   .about = about,

@@ -663,13 +663,7 @@ int command_study(int argc, char **argv)
         {"--seconds", "S", PAL_FLAG_NUMBER, &run.request.seconds, 0.01, 60, "simulated time of the first load (0.5)"},
         {"--quick", NULL, PAL_FLAG_SWITCH, &run.request.quick, 0, 0, "few configurations and a coarser reference"},
         {"--out", "FOLDER", PAL_FLAG_TEXT, &run.folder, 0, 0, "folder of the study's files (beside the scene)"},
-        {"--shard", "I/N", PAL_FLAG_TEXT, &run.shard.shard, 0, 0,
-         "measure part I of N, from 1, of the configurations; started again it continues after its last stored one"},
-        {"--results", "FOLDER", PAL_FLAG_TEXT, &run.shard.folder, 0, 0,
-         "where --shard keeps its results, a line for each configuration"},
-        {"--merge", "FOLDER", PAL_FLAG_TEXT, &run.shard.merge, 0, 0,
-         "write the study of all shards in a folder, with the input and flags of their runs. Errors equal those of a\n"
-         "run without shards to the bit; times, and what is chosen by them, are those measured"},
+        PAL_SHARD_FLAGS(run.shard, "configuration"),
         {"--again", NULL, PAL_FLAG_SWITCH, &run.again, 0, 0, "start over instead of continuing"},
         {"--units", "UNIT", PAL_FLAG_TEXT, &unit, 0, 0, "unit of a surface file: m, cm, mm, um, in (guessed)"},
     };
