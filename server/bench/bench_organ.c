@@ -1,7 +1,8 @@
 /* `palpate bench organ [SURFACE.ply]`: finite-element organs of growing size, live under a pull that is switched on and
  * off, by each preconditioner. The voxels of a closed surface, or of a computed organ; its lowest 12 % are held, E
  * 20 kPa, nu 0.45; the nodes within a fifth of the organ's length of its highest one are pulled sideways. Medians over
- * steps: the processor's time of the calling thread, also with several. */
+ * steps: the processor's time of the calling thread, also with several. Then organs with five stiff lumps in a row, E
+ * times the contrast. */
 #include "server/bench/bench.h"
 #include "server/bench/bench_body.h"
 
@@ -19,7 +20,7 @@ enum { STEPS_MAX = 120 };
 typedef struct job {
     pal_prepared mesh;
     const char *solver, *kind;
-    double young_Pa, step_s;
+    double young_Pa, step_s, contrast;
     int threads;
 } job;
 
@@ -48,6 +49,24 @@ static pal_err make_body(const pal_surface *surface, int n_node, pal_prepared *o
     return pal_prepared_make(surface, &options, out, &report, diag);
 }
 
+/* boxes a fifth of the organ's length apart along x, nearly as wide, in the middle of y and z; only what is inside the
+ * organ counts */
+static void add_lumps(pal_body_def *body, const job *j)
+{
+    double low[3], high[3];
+    pal_surface_box(&j->mesh.surface, low, high);
+    const double length = high[0] - low[0];
+    for (int k = 0; k < 5; k++) {
+        pal_region *lump = &body->region[body->n_region++];
+        *lump = (pal_region){
+            .kind = PAL_REGION_BOX, .young_Pa = j->contrast * j->young_Pa, .poisson = NAN, .density_kg_m3 = NAN};
+        for (int c = 0; c < 3; c++) {
+            const double at = c == 0 ? low[0] + 0.2 * (k + 0.5) * length : 0.5 * (low[c] + high[c]);
+            lump->low_m[c] = at - 0.08 * length, lump->high_m[c] = at + 0.08 * length;
+        }
+    }
+}
+
 static pal_err make_scene(const job *j, pal_scene *scene, pal_diagnostic *diag)
 {
     pal_scene_default(scene);
@@ -57,6 +76,7 @@ static pal_err make_scene(const job *j, pal_scene *scene, pal_diagnostic *diag)
     pal_body_def *body = &scene->body[0];
     pal_body_default(body, "body", &j->mesh);
     body->material.young_Pa = j->young_Pa, body->material.poisson = 0.45;
+    if (j->contrast > 0) add_lumps(body, j);
     body->output.name[0] = 0;
     body->n_effect = 0;
     pal_entry_init(&body->model, "model", "fem");
@@ -125,6 +145,7 @@ static pal_err run_live(const job *j, pal_table *r, pal_diagnostic *diag)
         TABLE_ROW(r, NUMBER("nodes", "nodes", 6, 0, body->n_node), TEXT("solver", "solver", -14, j->solver),
                   TEXT("preconditioner", "preconditioner", -14, j->kind),
                   NUMBER("threads", "threads", 7, 0, j->threads), NUMBER("young_Pa", "E Pa", 7, 0, j->young_Pa),
+                  NUMBER("contrast", "contrast", 8, 0, fmax(1, j->contrast)),
                   NUMBER("make_s", "make s", 7, 3, made - began), NUMBER("p50_ms", "ms p50", 8, 3, p50_ms),
                   NUMBER("p95_ms", "ms p95", 8, 3, ms[n * 95 / 100]), NUMBER("cg_mean", "CG mean", 7, 1, mean_cg),
                   NUMBER("cg_max", "CG max", 6, 0, max_cg), NUMBER("move_mm", "moves mm", 8, 2, 1e3 * move_m));
@@ -176,6 +197,17 @@ pal_err bench_organ(pal_table *r, pal_diagnostic *diag)
         for (int k = 0; k < 8 && !err; k++) {
             j.kind = kind[k % 4], j.young_Pa = k < 4 ? 5e3 : 1e5, j.threads = k % 4 == 3 ? 2 : 1;
             if (k % 4 != 0 || j.mesh.tets.n_node < 10000) err = run_live(&j, r, diag);
+        }
+        pal_prepared_free(&j.mesh);
+    }
+    pal_table_note(r, "live, with stiff lumps:");
+    pal_table_list(r, "contrast");
+    for (int s = 1; s < 4 && !err; s++) {
+        job j = {.solver = "implicit_euler", .step_s = 1.0 / 60, .young_Pa = 5e3, .threads = 1};
+        err = make_body(&surface, size[s], &j.mesh, diag);
+        for (int k = 0; k < 6 && !err; k++) {
+            j.kind = k % 2 ? "multigrid" : "factor", j.contrast = k < 2 ? 0 : k < 4 ? 1e2 : 1e4;
+            if (k % 2 || j.mesh.tets.n_node < 5000) err = run_live(&j, r, diag);
         }
         pal_prepared_free(&j.mesh);
     }

@@ -41,8 +41,9 @@
 #define PAL_FREQUENCY_SHIFT 1e-12
 #define PAL_FREQUENCY_ZERO  1e-10
 
-/* element over the softest, above which it is stiff to multigrid: with 9 iterations in place of 7, or 10 in place of 5,
- * the factor of the stiff nodes pays for itself (tests/sim/implicit/test_preconditioner.c) */
+/* stiffness of an element over that of the softest, above which it has a part in the factor of the stiff nodes. A
+ * contrast of 10 takes 6 or 7 iterations without this factor, too few for what it costs; 30 takes 7 to 10, and 5 with
+ * it; 100 nearly three times as many as with it (tests/bench) */
 #define PAL_STIFF_CONTRAST 20
 /* entries of a factor that solves faster than multigrid: 6 MB, most of which stays in the processor's caches
  * (tests/bench) */
