@@ -22,13 +22,14 @@
 #include <libgen.h>
 #include <limits.h>
 #include <math.h>
+#include <poll.h>
 #include <pthread.h>
-#include <semaphore.h>
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/eventfd.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -234,19 +235,26 @@ static int announce(const serve_run *run)
 
 static const int handled_signal[] = {SIGINT, SIGTERM, SIGHUP, SIGCHLD};
 enum { N_HANDLED = sizeof handled_signal / sizeof *handled_signal };
-static sem_t woken; /* posted by each handled signal and by the end of the network thread */
+static int woken; /* eventfd: written by each handled signal and by the end of the network thread */
 static atomic_bool stop_asked;
 
 static void on_signal(int number)
 {
+    const int kept = errno;
     if (number != SIGCHLD) stop_asked = true;
-    sem_post(&woken);
+    eventfd_write(woken, 1);
+    errno = kept;
 }
 
+/* poll instead of a semaphore: ThreadSanitizer holds a signal back until the thread calls something that it intercepts,
+ * and sem_clockwait is not among these */
 static void wait_until(uint64_t when_ns)
 {
-    struct timespec when = {(time_t)(when_ns / 1000000000u), (long)(when_ns % 1000000000u)};
-    sem_clockwait(&woken, CLOCK_MONOTONIC, &when);
+    struct pollfd fd = {.fd = woken, .events = POLLIN};
+    const uint64_t now_ns = pal_clock_ns(), left_ns = when_ns > now_ns ? when_ns - now_ns : 0;
+    const struct timespec left = {(time_t)(left_ns / 1000000000u), (long)(left_ns % 1000000000u)};
+    eventfd_t n;
+    if (ppoll(&fd, 1, &left, NULL) > 0) eventfd_read(woken, &n);
 }
 
 /* ---- palpate-lcm ---- */
@@ -368,14 +376,16 @@ static void *net_main(void *user)
     run->net_err = pal_server_run(run->server);
     /* wakes the waiting thread, also when the loop failed by itself */
     stop_asked = true;
-    sem_post(&woken);
+    eventfd_write(woken, 1);
     return NULL;
 }
 
 static pal_err run_all(serve_run *run, const char *const *input, int n_input, pal_diagnostic *diag)
 {
     struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_RESTART};
-    sem_init(&woken, 0, 0);
+    woken = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    if (woken < 0)
+        return pal_diagnostic_set(diag, PAL_ERR_IO, "a descriptor for signals cannot be opened: %s", strerror(errno));
     for (int k = 0; k < N_HANDLED; k++) sigaction(handled_signal[k], &action, NULL);
     signal(SIGPIPE, SIG_IGN);
     PAL_TRY(open_inputs(run, input, n_input, diag));
