@@ -201,7 +201,8 @@ typedef struct pal_wire_status {
     double component_ms[PAL_WIRE_COMPONENT_MAX]; /* mean time of each component in one step           */
     uint32_t n_component_name;                   /* 0: the components are those of hello                          */
     char component[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_NAME_BYTES]; /* the current plan         */
-    uint32_t n_member;
+    uint32_t n_member;                                           /* who may hold tools or give orders */
+    uint32_t n_viewer;                                           /* who only watch; 0: not on the wire */
     double bytes_s;                 /* sent by the server to this member, bytes per second            */
     double rtt_ms;                  /* of this member as the server sees it; 0 unknown                */
     uint32_t n_skipped;             /* cycles not sent to this member because it had no credit, total */

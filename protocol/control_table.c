@@ -109,6 +109,7 @@ static const pal_control_field STATUS_fields[] = {
     {"component_ms", NUMBERS, true, LIST(status, component_ms, n_component), NULL},
     {"components", TEXTS, false, LIST(status, component, n_component_name), NULL},
     {"members", U32, true, ONE(status, n_member)},
+    {"viewers", U32, false, ONE(status, n_viewer)},
     {"bytes_s", F64, true, ONE(status, bytes_s)},
     {"rtt_ms", F64, true, ONE(status, rtt_ms)},
     {"skipped_cycles", U32, true, ONE(status, n_skipped)},

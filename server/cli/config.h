@@ -9,7 +9,7 @@
 #include "server/base/flags.h"
 #include "server/base/log.h"
 
-enum { PAL_CONFIG_TEXT = 256, PAL_CONFIG_KEYS = 18 };
+enum { PAL_CONFIG_TEXT = 256, PAL_CONFIG_KEYS = 19 };
 
 typedef struct pal_config {
     char listen[PAL_CONFIG_TEXT]; /* "127.0.0.1"                                                         */
@@ -23,6 +23,7 @@ typedef struct pal_config {
     char viewer[PAL_CONFIG_TEXT];      /* folder of the page's files; "": the one beside the program          */
     double error_m;                    /* bound of streamed positions; 0: 1/3000 of the box, at most 0.05 mm  */
     int max_clients;                   /* 200                                                                 */
+    int max_viewers;                   /* 1000                                                                */
     int threads;                       /* of a session whose scene gives none; 1                              */
     char lcm[PAL_CONFIG_TEXT];         /* LCM URL: start palpate-lcm with it; "": no LCM                      */
     char lcm_key[PAL_CONFIG_TEXT];     /* key file of that bus; "": none */

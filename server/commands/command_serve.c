@@ -172,6 +172,7 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
                                   .viewer_folder = viewer_folder(&run->config, folder, sizeof folder),
                                   .error_m = run->config.error_m,
                                   .max_clients = run->config.max_clients,
+                                  .max_viewers = run->config.max_viewers,
                                   .resume = run->resume,
                                   .study = run->study,
                                   .recording = run->recording,

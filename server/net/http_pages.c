@@ -4,6 +4,7 @@
 
 #include "server/base/json_members.h"
 #include "server/base/log.h"
+#include "server/net/hub_peers.h"
 #include "server/net/hub_rights.h"
 #include "server/net/hub_sessions.h"
 #include "server/net/transport/plain_text.h"
@@ -75,15 +76,19 @@ static bool knows(const pal_hub *hub, const pal_request *request, const char *se
            (hub->open || grant.has_ticket) && grant.role >= role;
 }
 
+/* members, then viewers, as many as `members` of the protocol names */
 static void add_people(cJSON *session, const pal_hub_room *room)
 {
     cJSON *people = cJSON_AddArrayToObject(session, "people");
-    for (int i = 0; i < PAL_MEMBER_LIST_MAX; i++) {
-        const pal_member_entry *m = &room->members.member[i];
-        if (m->id)
-            cJSON_AddItemToArray(people, PAL_JSON({"name", JSON_TEXT(m->name)},
-                                                  {"role", JSON_TEXT(pal_wire_role_name((pal_wire_role)m->role))}));
-    }
+    int n = 0;
+    for (int viewers = 0; viewers < 2; viewers++)
+        for (pal_client *c = NULL; n < PAL_WIRE_MEMBER_MAX && (c = pal_hub_next_member(room, c));) {
+            if (pal_hub_only_watches(c) != viewers) continue;
+            cJSON_AddItemToArray(people,
+                                 PAL_JSON({"name", JSON_TEXT(c->member->name)},
+                                          {"role", JSON_TEXT(pal_wire_role_name((pal_wire_role)c->member->role))}));
+            n++;
+        }
 }
 
 static cJSON *session_json(const pal_hub_room *room)
@@ -99,8 +104,9 @@ static cJSON *session_json(const pal_hub_room *room)
     for (int p = 0; p < room->stream->n_part; p++)
         cJSON_AddItemToArray(assets, JSON_TEXT(room->stream->part[p].info.asset));
     return PAL_JSON({"name", JSON_TEXT(scene->name)}, {"title", JSON_TEXT(title)}, {"accuracy", JSON_TEXT(accuracy)},
-                    {"members", JSON_NUMBER(room->members.n_member)}, {"tools", JSON_NUMBER(room->members.n_tool)},
-                    {"free_tools", JSON_NUMBER(n_free)}, {"parts", JSON_NUMBER(room->stream->n_part)},
+                    {"members", JSON_NUMBER(room->members.n_member)}, {"viewers", JSON_NUMBER(room->n_viewer)},
+                    {"tools", JSON_NUMBER(room->members.n_tool)}, {"free_tools", JSON_NUMBER(n_free)},
+                    {"parts", JSON_NUMBER(room->stream->n_part)},
                     {"state", JSON_TEXT(pal_hub_playing(room, NULL) ? "recording"
                                         : f && f->paused            ? "paused"
                                                                     : "running")},
@@ -230,6 +236,7 @@ static void get_metrics(pal_hub *hub, const pal_request *request, pal_reply *rep
         const pal_stream *s = room->stream;
         for (int i = 0; i < PAL_MEMBER_LIST_MAX; i++)
             if (room->members.member[i].id) role[room->members.member[i].role]++;
+        role[PAL_MEMBER_VIEWER] += room->n_viewer;
         if (s->step_ms * 1e-3 > step_s) step_s = s->step_ms * 1e-3;
         late += s->frame ? (double)s->frame->n_late : 0;
         encode_s += (double)s->count.encode_ns * 1e-9;
@@ -241,7 +248,7 @@ static void get_metrics(pal_hub *hub, const pal_request *request, pal_reply *rep
         {"build_info", "Version of this program.", "version=\"" PAL_VERSION "\"", 1},
         {"sessions", "Sessions of this process.", NULL, hub->n_room},
         {"recordings_failed", "Sessions whose recording has ended by a failed write.", NULL, n_record_error},
-        {"clients", "Members by role.", "role=\"viewer\",transport=\"ws\"", role[PAL_MEMBER_VIEWER]},
+        {"clients", "Members and viewers by role.", "role=\"viewer\",transport=\"ws\"", role[PAL_MEMBER_VIEWER]},
         {.label = "role=\"trainee\",transport=\"ws\"", .value = role[PAL_MEMBER_TRAINEE]},
         {.label = "role=\"instructor\",transport=\"ws\"", .value = role[PAL_MEMBER_INSTRUCTOR]},
         {"sim_step_seconds", "Smoothed time of a step, slowest session.", NULL, step_s},

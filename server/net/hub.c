@@ -52,6 +52,7 @@ static pal_packet *status_message(pal_client *c)
     pal_wire_status *w = &pal_hub_message(hub, PAL_CONTROL_STATUS)->status;
     pal_diagnostic diag = {""};
     w->n_member = (uint32_t)c->room->members.n_member;
+    w->n_viewer = (uint32_t)c->room->n_viewer;
     w->rtt_ms = c->credit.rtt_s * 1e3;
     w->n_skipped = (uint32_t)c->n_skipped;
     if (c->status_ns && now > c->status_ns)
@@ -254,9 +255,9 @@ static void client_closed(void *user, pal_peer *peer)
 static void offer_cycle(pal_hub_room *room)
 {
     for (pal_client *c = NULL; (c = pal_hub_next_member(room, c));) {
-        pal_member_entry *m = pal_members_find(&room->members, c->id);
-        if (m && m->tool >= 0 && room->stream->haptic[m->tool])
-            pal_packet_replace(&c->haptic, pal_packet_hold(room->stream->haptic[m->tool]));
+        const int tool = c->member->tool;
+        if (tool >= 0 && room->stream->haptic[tool])
+            pal_packet_replace(&c->haptic, pal_packet_hold(room->stream->haptic[tool]));
         if (client_waiting(NULL, c->peer)) c->peer->ops->ready(c->peer);
     }
 }
@@ -366,7 +367,8 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
     hub->started_s = (uint32_t)time(NULL);
     hub->health_on_main = !options->allow_remote && !(options->health && options->health[0]);
     hub->max_members = options->max_clients > 0 ? options->max_clients : PAL_HUB_CLIENTS;
-    hub->max_clients = hub->max_members + PAL_UNJOINED_PLACES;
+    hub->max_viewers = options->max_viewers > 0 ? options->max_viewers : PAL_HUB_VIEWERS;
+    hub->max_clients = hub->max_members + hub->max_viewers + PAL_UNJOINED_PLACES;
     hub->client = calloc((size_t)hub->max_clients, sizeof *hub->client);
     hub->control = malloc(sizeof *hub->control);
     hub->text = malloc(PAL_CONTROL_OUT_MAX + 1);

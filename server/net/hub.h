@@ -18,12 +18,12 @@ typedef struct pal_server_options {
     const char *viewer_folder; /* files served at /; NULL: none                                             */
     const struct pal_transport_ops *transport; /* NULL: websockets */
     /* of the hub */
-    bool open;                  /* whoever comes is what it asks to be; else a client without a ticket is a viewer */
-    const char *key_file;       /* of tickets (ticket_keys.h); NULL: none */
-    double error_m;             /* bound of streamed positions per axis; 0: 1/3000 of the box, at most 0.05 mm */
-    int max_clients;            /* 0: 200 */
-    struct pal_resume **resume; /* of sessions that go on after a crash: their edits, taken [n_session]; NULL, or an
-                                   entry of it: none */
+    bool open;                    /* whoever comes is what it asks to be; else a client without a ticket is a viewer */
+    const char *key_file;         /* of tickets (ticket_keys.h); NULL: none */
+    double error_m;               /* bound of streamed positions per axis; 0: 1/3000 of the box, at most 0.05 mm */
+    int max_clients, max_viewers; /* members, and who only watches; 0: 200, 1000 */
+    struct pal_resume **resume;   /* of sessions that go on after a crash: their edits, taken [n_session]; NULL, or an
+                                     entry of it: none */
     const pal_session_study *study;         /* [n_session], borrowed until close; NULL: none */
     const pal_session_recording *recording; /* that they play [n_session], copied; NULL: none */
     const pal_session_source *source; /* borrowed until close; NULL: sessions are neither opened nor ended later */

@@ -10,7 +10,13 @@
 #include "server/session/recording.h"
 #include "server/session/sculpt.h"
 
-enum { PAL_HUB_QUEUE = 32, PAL_HUB_OLD_ASSETS = 8, PAL_HUB_CLIENTS = 200, PAL_SESSIONS_MAX = 64 };
+enum {
+    PAL_HUB_QUEUE = 32,
+    PAL_HUB_OLD_ASSETS = 8,
+    PAL_HUB_CLIENTS = 200,
+    PAL_HUB_VIEWERS = 1000,
+    PAL_SESSIONS_MAX = 64
+};
 
 typedef struct pal_hub pal_hub;
 
@@ -55,7 +61,10 @@ typedef struct pal_client {
     pal_hub *hub;
     pal_peer *peer;
     struct pal_hub_room *room;
-    int id; /* member id; 0: not joined */
+    int id;                   /* member id; 0: not joined */
+    pal_member_entry *member; /* of the room's members, or viewer; NULL: not joined */
+    pal_member_entry viewer;  /* of who only watches and is counted apart */
+    bool listed;              /* a viewer that the room's members_message names */
     uint64_t opened_ns;
     pal_grant grant;
     pal_bucket poses, orders; /* what it may send: poses and acknowledgements; control messages */
@@ -156,6 +165,7 @@ typedef struct pal_hub_room {
     pal_hub_body_edits edits[PAL_BODY_MAX];
     pal_hub_tool_brush brush[PAL_TOOL_MAX];
     pal_member_list members;
+    int n_viewer; /* who only watch: not among the members */
     bool members_changed;
     pal_packet *members_message;             /* encoded once for all; NULL: none yet */
     uint64_t news_ns;                        /* when members or orders were told last */
@@ -207,8 +217,9 @@ struct pal_hub {
     double error_m;
     pal_site *site;
     pal_admission *admission;
-    int n_room, n_numbered, max_members, max_clients,
-        n_client;           /* max_clients: members and those who have not joined yet */
+    int n_room, n_numbered, n_client;
+    int max_members, max_viewers, max_clients; /* max_clients: both, and those who have not joined yet */
+    uint32_t n_viewed;                         /* viewers that have joined, in all */
     _Atomic uint64_t ended; /* bit i: session i of those that it was given was ended by an instructor */
     bool leaving;
     uint32_t started_s;                   /* Unix time */

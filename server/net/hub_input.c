@@ -57,7 +57,7 @@ static int pose(pal_client *c, const uint8_t *bytes, size_t n_byte)
     int refusal = pal_wire_get_pose(bytes, n_byte, &w);
     c->hub->count.n_pose++;
     if (refusal) return refusal;
-    const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
+    const pal_member_entry *m = c->member;
     if (m->tool < 0 || m->tool != w.tool) {
         c->hub->count.n_pose_ignored++;
         if (m->role == PAL_MEMBER_VIEWER && (c->pose_error_ns == 0 || now - c->pose_error_ns > PAL_POSE_ERROR_NS)) {

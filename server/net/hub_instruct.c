@@ -13,11 +13,6 @@ static pal_client *find_member(pal_client *c, const pal_wire_command *command)
     return NULL;
 }
 
-static pal_member_entry *entry_of(pal_client *c)
-{
-    return pal_members_find(&c->room->members, c->id);
-}
-
 /* index of the argument `tool`; -1: an error was sent */
 static int find_tool(pal_client *c, const pal_wire_command *command)
 {
@@ -53,7 +48,7 @@ bool pal_hub_run_allow(pal_client *c, const pal_verb *verb, const pal_wire_comma
     } else {
         pal_client *m = find_member(c, command);
         if (!m) return false;
-        set_rights(entry_of(m), rights, enabled);
+        set_rights(m->member, rights, enabled);
     }
     pal_hub_members_changed(c->room);
     return true;
@@ -67,14 +62,14 @@ bool pal_hub_run_hand_over(pal_client *c, const pal_verb *verb, const pal_wire_c
     if (tool < 0) return false;
     pal_client *to = to_nobody ? NULL : find_member(c, command), *from = holder_of(c, tool);
     if (!to && !to_nobody) return false;
-    if (to && entry_of(to)->role == PAL_MEMBER_VIEWER)
-        return pal_hub_refuse(c, "role", "%s is a viewer, who holds no tool", entry_of(to)->name);
-    if (to && entry_of(to)->muted) return pal_hub_refuse(c, "muted", "%s is muted", entry_of(to)->name);
+    if (to && to->member->role == PAL_MEMBER_VIEWER)
+        return pal_hub_refuse(c, "role", "%s is a viewer, who holds no tool", to->member->name);
+    if (to && to->member->muted) return pal_hub_refuse(c, "muted", "%s is muted", to->member->name);
     if (from == to) return true;
     if (from) {
         pal_hub_give_tool_back(from);
-        pal_hub_refuse(from, "tool_handed_over", "%s has given tool %d to %s", entry_of(c)->name, tool,
-                       to ? entry_of(to)->name : "nobody");
+        pal_hub_refuse(from, "tool_handed_over", "%s has given tool %d to %s", c->member->name, tool,
+                       to ? to->member->name : "nobody");
     }
     if (!to) return true;
     /* an instructor may give what is locked */
@@ -82,7 +77,7 @@ bool pal_hub_run_hand_over(pal_client *c, const pal_verb *verb, const pal_wire_c
     c->room->members.tool_locked[tool] = false;
     const bool taken = pal_hub_take_tool(to, tool);
     c->room->members.tool_locked[tool] = locked;
-    return taken || pal_hub_refuse(c, "tool", "%s may not hold tool %d", entry_of(to)->name, tool);
+    return taken || pal_hub_refuse(c, "tool", "%s may not hold tool %d", to->member->name, tool);
 }
 
 bool pal_hub_run_lock(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
@@ -95,9 +90,9 @@ bool pal_hub_run_lock(pal_client *c, const pal_verb *verb, const pal_wire_comman
         if (tool < 0) return false;
         pal_client *holder = holder_of(c, tool);
         c->room->members.tool_locked[tool] = enabled;
-        if (enabled && holder && entry_of(holder)->role != PAL_MEMBER_INSTRUCTOR) {
+        if (enabled && holder && holder->member->role != PAL_MEMBER_INSTRUCTOR) {
             pal_hub_give_tool_back(holder);
-            pal_hub_refuse(holder, "tool_locked", "%s has locked tool %d", entry_of(c)->name, tool);
+            pal_hub_refuse(holder, "tool_locked", "%s has locked tool %d", c->member->name, tool);
         }
     }
     pal_hub_members_changed(c->room);
@@ -109,12 +104,12 @@ bool pal_hub_run_mute(pal_client *c, const pal_verb *verb, const pal_wire_comman
     (void)verb;
     pal_client *m = find_member(c, command);
     if (!m) return false;
-    if (entry_of(m)->role == PAL_MEMBER_INSTRUCTOR)
-        return pal_hub_refuse(c, "role", "%s is an instructor", entry_of(m)->name);
-    entry_of(m)->muted = pal_hub_arg(command, "enabled", 1) != 0;
-    if (entry_of(m)->muted) {
+    if (m->member->role == PAL_MEMBER_INSTRUCTOR)
+        return pal_hub_refuse(c, "role", "%s is an instructor", m->member->name);
+    m->member->muted = pal_hub_arg(command, "enabled", 1) != 0;
+    if (m->member->muted) {
         pal_hub_give_tool_back(m);
-        pal_hub_refuse(m, "muted", "%s lets you watch only", entry_of(c)->name);
+        pal_hub_refuse(m, "muted", "%s lets you watch only", c->member->name);
     }
     pal_hub_members_changed(c->room);
     return true;
@@ -127,6 +122,6 @@ bool pal_hub_run_remove(pal_client *c, const pal_verb *verb, const pal_wire_comm
     if (!m) return false;
     if (m == c) return pal_hub_refuse(c, "member", "that is you");
     if (ban) pal_admission_ban(c->hub->admission, &m->grant);
-    pal_hub_drop(m, PAL_WIRE_CLOSE_REMOVED, "%s has %s you", entry_of(c)->name, ban ? "banned" : "removed");
+    pal_hub_drop(m, PAL_WIRE_CLOSE_REMOVED, "%s has %s you", c->member->name, ban ? "banned" : "removed");
     return true;
 }

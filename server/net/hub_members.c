@@ -16,7 +16,7 @@
 static pal_err take_tool(pal_client *c, int wanted)
 {
     pal_hub_room *room = c->room;
-    int before = pal_members_find(&room->members, c->id)->tool, taken = -1;
+    int before = c->member->tool, taken = -1;
     if (wanted == PAL_WIRE_TOOL_ANY) wanted = c->grant.tool;
     if (c->grant.tool != PAL_WIRE_TOOL_ANY && wanted != c->grant.tool) return PAL_ERR_REFUSED;
     PAL_TRY(pal_members_take_tool(&room->members, c->id, wanted == PAL_WIRE_TOOL_ANY ? -1 : wanted, &taken));
@@ -53,7 +53,7 @@ void pal_hub_hand_over_idle_tools(pal_hub *hub)
         pal_hub_give_tool_back(holder);
         if (take_tool(next, tool)) continue;
         pal_hub_refuse(holder, "tool_idle", "tool %d was not moved for %d s and is held by %s now", tool,
-                       (int)(PAL_IDLE_NS / 1000000000u), pal_members_find(&room->members, next->id)->name);
+                       (int)(PAL_IDLE_NS / 1000000000u), next->member->name);
         pal_hub_members_changed(room);
     }
 }
@@ -61,7 +61,7 @@ void pal_hub_hand_over_idle_tools(pal_hub *hub)
 static bool explain_take(pal_client *c, int wanted, pal_err err)
 {
     pal_member_list *members = &c->room->members;
-    const pal_member_entry *me = pal_members_find(members, c->id);
+    const pal_member_entry *me = c->member;
     const bool known = wanted >= 0 && wanted < members->n_tool;
     const int holder = known ? members->holder[wanted] : 0;
     if (err == PAL_ERR_STATE && wanted == PAL_WIRE_TOOL_ANY && !c->waits_ns)
@@ -89,7 +89,7 @@ bool pal_hub_take_tool(pal_client *c, int tool)
 
 void pal_hub_give_tool_back(pal_client *c)
 {
-    const int tool = pal_members_find(&c->room->members, c->id)->tool;
+    const int tool = c->member->tool;
     c->waits_ns = 0;
     if (tool < 0) return;
     pal_members_release_tool(&c->room->members, c->id);
@@ -102,7 +102,7 @@ void pal_hub_give_tool_back(pal_client *c)
 
 static void send_hello(pal_client *c)
 {
-    const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
+    const pal_member_entry *m = c->member;
     pal_wire_hello *hello = &pal_hub_message(c->hub, PAL_CONTROL_HELLO)->hello;
     pal_stream_hello(c->room->stream, hello);
     pal_hub_put_plan(c->room, &hello->plan);
@@ -117,29 +117,62 @@ static void send_hello(pal_client *c)
     pal_hub_send(c);
 }
 
-/* is there a place in the whole server for this member? */
+/* is there a place in the whole server for this member or viewer? Neither takes a place of the other */
 static bool has_place(const pal_client *c, pal_wire_role role)
 {
     const pal_hub *hub = c->hub;
-    int n = 0, n_address = 0, kept = hub->max_members / 4;
+    const bool watches = role == PAL_WIRE_ROLE_VIEWER;
+    int n = 0, n_address = 0, kept = hub->max_members / 4, of_address = PAL_ADDRESS_PLACES;
     if (kept > PAL_INSTRUCTOR_PLACES) kept = PAL_INSTRUCTOR_PLACES;
     for (int i = 0; i < hub->max_clients; i++) {
         const pal_client *other = &hub->client[i];
-        if (!other->peer || !other->id) continue;
+        if (!other->peer || !other->id || pal_hub_only_watches(other) != watches) continue;
         n++;
         n_address += !strcmp(other->grant.address, c->grant.address);
     }
     if (role == PAL_WIRE_ROLE_INSTRUCTOR) return n < hub->max_members;
     /* from this machine comes a proxy for everybody, and whoever is here can do worse than fill places */
     const bool counted = !pal_address_is_loopback(c->grant.address) && !c->grant.ticket.uses && !c->grant.ticket.user;
-    return n < hub->max_members - kept && (!counted || n_address < PAL_ADDRESS_PLACES);
+    if (watches && of_address < hub->max_viewers / PAL_VIEWING_ADDRESSES)
+        of_address = hub->max_viewers / PAL_VIEWING_ADDRESSES;
+    return n < (watches ? hub->max_viewers : hub->max_members - kept) && (!counted || n_address < of_address);
+}
+
+/* an id that no other viewer of the room has */
+static int viewer_id(pal_hub_room *room)
+{
+    const pal_client *other = NULL;
+    int id;
+    do {
+        id = PAL_MEMBER_ID_MAX + 1 + (int)(room->hub->n_viewed++ % (uint32_t)(UINT16_MAX - PAL_MEMBER_ID_MAX));
+        for (other = NULL; (other = pal_hub_next_member(room, (pal_client *)other)) && other->id != id;) {
+        }
+    } while (other);
+    return id;
+}
+
+/* FULL, STATE: as pal_members_join */
+static pal_err enter_room(pal_client *c, pal_wire_role role, const char *name)
+{
+    static const pal_member_role roles[PAL_WIRE_ROLE_COUNT] = {PAL_MEMBER_VIEWER, PAL_MEMBER_TRAINEE,
+                                                               PAL_MEMBER_INSTRUCTOR};
+    pal_hub_room *room = c->room;
+    if (role != PAL_WIRE_ROLE_VIEWER) {
+        PAL_TRY(pal_members_join(&room->members, roles[role], name, &c->id));
+        c->member = pal_members_find(&room->members, c->id);
+        return PAL_ERR_OK;
+    }
+    if (room->members.locked) return PAL_ERR_STATE;
+    c->viewer = (pal_member_entry){.id = viewer_id(room), .role = PAL_MEMBER_VIEWER, .tool = -1};
+    pal_members_name(&room->members, name, c->viewer.name);
+    c->id = c->viewer.id, c->member = &c->viewer;
+    room->n_viewer++;
+    return PAL_ERR_OK;
 }
 
 /* a member as it joins; sends nothing. false: the client is closed with the reason */
 static bool enter(pal_client *c, pal_wire_role role, const char *name)
 {
-    static const pal_member_role roles[PAL_WIRE_ROLE_COUNT] = {PAL_MEMBER_VIEWER, PAL_MEMBER_TRAINEE,
-                                                               PAL_MEMBER_INSTRUCTOR};
     const uint64_t now = pal_loop_now_ns(c->hub->loop);
     const char *full = "the server has no free place";
     pal_err err = PAL_ERR_FULL;
@@ -148,7 +181,7 @@ static bool enter(pal_client *c, pal_wire_role role, const char *name)
         err = pal_admission_enter(c->hub->admission, &c->grant, now);
         if (!err) {
             full = "the session has no free place";
-            err = pal_members_join(&c->room->members, roles[role], name, &c->id);
+            err = enter_room(c, role, name);
             if (err) pal_admission_leave(c->hub->admission, &c->grant, now);
         }
     }
@@ -177,15 +210,18 @@ void pal_hub_join(pal_client *c, const pal_wire_join *wanted)
     /* hello names role and tool; refusals follow it */
     pal_err err = PAL_ERR_OK;
     if (wanted->tool != PAL_WIRE_TOOL_NONE && role != PAL_WIRE_ROLE_VIEWER) err = take_tool(c, wanted->tool);
-    pal_log(PAL_LOG_INFO, "join", "%s joins %s as member %d, %s, from %s%s",
-            pal_members_find(&room->members, c->id)->name, pal_session_scene(room->session)->name, c->id,
-            pal_wire_role_name(role), c->grant.address[0] ? c->grant.address : "this process",
-            c->grant.has_ticket ? ", with a ticket" : "");
+    pal_log(PAL_LOG_INFO, "join", "%s joins %s as member %d, %s, from %s%s", c->member->name,
+            pal_session_scene(room->session)->name, c->id, pal_wire_role_name(role),
+            c->grant.address[0] ? c->grant.address : "this process", c->grant.has_ticket ? ", with a ticket" : "");
     send_hello(c);
     if (role < wanted->role && c->id && c->grant.has_ticket)
         pal_hub_refuse(c, "role", "your ticket is for a %s", pal_wire_role_name(role));
     else if (role < wanted->role && c->id)
         pal_hub_refuse(c, "role", "without a ticket you may only watch: use an address that the server has printed");
     if (err && c->id) explain_take(c, wanted->tool, err);
-    pal_hub_members_changed(room);
+    /* a viewer beyond the list is no news to the others */
+    if (pal_hub_only_watches(c) && room->members.n_member + room->n_viewer > PAL_WIRE_MEMBER_MAX)
+        c->members_due = true;
+    else
+        pal_hub_members_changed(room);
 }

@@ -13,7 +13,7 @@
 void pal_hub_note_order(pal_client *c, const pal_wire_command *command)
 {
     pal_hub_room *room = c->room;
-    const pal_member_entry *m = pal_members_find(&room->members, c->id);
+    const pal_member_entry *m = c->member;
     pal_hub_order *order = &room->order[room->n_order++ % PAL_WIRE_ORDER_MAX];
     char text[256] = "";
     size_t n = 0;
@@ -31,20 +31,27 @@ void pal_hub_note_order(pal_client *c, const pal_wire_command *command)
     pal_loop_wake(c->hub->loop);
 }
 
+static void list_member(pal_wire_members *w, const pal_member_entry *from)
+{
+    pal_wire_member *to = &w->member[w->n_member++];
+    to->id = (uint16_t)from->id;
+    to->role = (pal_wire_role)from->role;
+    to->tool = from->tool >= 0 ? from->tool : PAL_WIRE_TOOL_NONE;
+    to->colour = pal_hub_colour(from->id);
+    to->muted = from->muted;
+    if (from->role == PAL_MEMBER_TRAINEE) pal_rights_text(from->rights, to->rights, sizeof to->rights);
+    pal_plain_text(to->name, sizeof to->name, from->name);
+}
+
+/* members, then viewers as far as there is room */
 static pal_packet *encode_members(pal_hub_room *room)
 {
     pal_wire_members *w = &pal_hub_message(room->hub, PAL_CONTROL_MEMBERS)->members;
-    for (int i = 0; i < PAL_MEMBER_LIST_MAX; i++) {
-        const pal_member_entry *from = &room->members.member[i];
-        if (!from->id) continue;
-        pal_wire_member *to = &w->member[w->n_member++];
-        to->id = (uint16_t)from->id;
-        to->role = (pal_wire_role)from->role;
-        to->tool = from->tool >= 0 ? from->tool : PAL_WIRE_TOOL_NONE;
-        to->colour = pal_hub_colour(from->id);
-        to->muted = from->muted;
-        if (from->role == PAL_MEMBER_TRAINEE) pal_rights_text(from->rights, to->rights, sizeof to->rights);
-        pal_plain_text(to->name, sizeof to->name, from->name);
+    for (int i = 0; i < PAL_MEMBER_LIST_MAX; i++)
+        if (room->members.member[i].id) list_member(w, &room->members.member[i]);
+    for (pal_client *c = NULL; (c = pal_hub_next_member(room, c));) {
+        c->listed = pal_hub_only_watches(c) && w->n_member < PAL_WIRE_MEMBER_MAX;
+        if (c->listed) list_member(w, c->member);
     }
     for (int t = 0; t < room->members.n_tool; t++)
         if (room->members.tool_locked[t]) w->locked_tool[w->n_locked++] = t;
@@ -96,7 +103,7 @@ pal_hub_undo *pal_hub_undo_begin(pal_client *c, const char *verb)
     pal_hub_undo *undo = &room->undo[room->n_undo++];
     *undo = (pal_hub_undo){.member = c->id, .at_ns = pal_loop_now_ns(c->hub->loop)};
     snprintf(undo->verb, sizeof undo->verb, "%s", verb);
-    snprintf(undo->name, sizeof undo->name, "%s", pal_members_find(&room->members, c->id)->name);
+    snprintf(undo->name, sizeof undo->name, "%s", c->member->name);
     return undo;
 }
 

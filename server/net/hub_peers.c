@@ -92,18 +92,20 @@ void pal_hub_leave_room(pal_client *c)
     c->waits_ns = 0;
     if (!c->id) return;
     unsubscribe_all(c);
-    pal_member_entry *member = pal_members_find(&room->members, c->id);
-    int tool = member ? member->tool : -1;
-    if (member)
-        pal_log(PAL_LOG_INFO, "leave", "%s (member %d) leaves %s", member->name, c->id,
-                pal_session_scene(room->session)->name);
-    pal_members_leave(&room->members, c->id);
+    const int tool = c->member->tool;
+    pal_log(PAL_LOG_INFO, "leave", "%s (member %d) leaves %s", c->member->name, c->id,
+            pal_session_scene(room->session)->name);
+    const bool was_seen = !pal_hub_only_watches(c) || c->listed;
+    if (pal_hub_only_watches(c))
+        room->n_viewer--;
+    else
+        pal_members_leave(&room->members, c->id);
     if (tool >= 0) pal_hub_release_tool(room, tool);
     room->tier_users[c->tier]--;
     (void)pal_session_observe(room->session, false);
     pal_admission_leave(c->hub->admission, &c->grant, pal_loop_now_ns(c->hub->loop));
-    c->id = 0;
-    pal_hub_members_changed(room);
+    c->id = 0, c->member = NULL;
+    if (was_seen) pal_hub_members_changed(room);
 }
 
 void pal_hub_drop(pal_client *client, int code, const char *format, ...)
@@ -176,6 +178,11 @@ pal_client *pal_hub_next_member(const pal_hub_room *room, pal_client *after)
     for (pal_client *c = after ? after + 1 : room->hub->client; c < end; c++)
         if (c->peer && c->room == room && c->id && !c->peer->drop_code) return c;
     return NULL;
+}
+
+bool pal_hub_only_watches(const pal_client *c)
+{
+    return c->id > PAL_MEMBER_ID_MAX;
 }
 
 void pal_hub_members_changed(pal_hub_room *room)

@@ -22,6 +22,7 @@ void pal_hub_drop(pal_client *client, int code, const char *format, ...) __attri
 void pal_hub_leave_room(pal_client *client);
 /* next client that has joined the room and is not being closed; after NULL: the first; NULL: no more */
 pal_client *pal_hub_next_member(const pal_hub_room *room, pal_client *after);
+bool pal_hub_only_watches(const pal_client *client);     /* joined as a viewer, which is no member */
 void pal_hub_members_changed(pal_hub_room *room);        /* tells the members soon */
 void pal_hub_release_tool(pal_hub_room *room, int tool); /* the tool has no holder any more and leaves the scene */
 uint32_t pal_hub_colour(int member);                     /* 0xRRGGBB */

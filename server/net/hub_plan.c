@@ -79,7 +79,7 @@ void pal_hub_count_unobserved(pal_hub_room *room)
     uint64_t n_shown = n_output > room->seen_output ? n_output - room->seen_output : 0;
     if (room->was_unobserved && n_step > n_shown) room->n_unobserved += n_step - n_shown;
     room->seen_tick = f->tick, room->seen_output = n_output;
-    room->was_unobserved = room->members.n_member == 0;
+    room->was_unobserved = room->members.n_member + room->n_viewer == 0;
 }
 
 void pal_hub_await_answer(pal_client *c, const char *verb)

@@ -38,7 +38,7 @@ uint32_t pal_rights_named(const char *name)
 
 bool pal_hub_may(const pal_client *c, pal_right right)
 {
-    const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
+    const pal_member_entry *m = c->member;
     const bool trainee = m->role == PAL_MEMBER_TRAINEE;
     if (m->role == PAL_MEMBER_INSTRUCTOR || right == PAL_RIGHT_EVERYBODY) return true;
     if (right == PAL_RIGHT_TRAINEE) return trainee;
@@ -48,7 +48,7 @@ bool pal_hub_may(const pal_client *c, pal_right right)
 
 bool pal_hub_is_instructor(const pal_client *c)
 {
-    return pal_members_find(&c->room->members, c->id)->role == PAL_MEMBER_INSTRUCTOR;
+    return c->member->role == PAL_MEMBER_INSTRUCTOR;
 }
 
 bool pal_hub_playing(const pal_hub_room *room, pal_playing *playing)

@@ -266,7 +266,7 @@ static bool place_brush(pal_client *c, int body, const pal_wire_command *command
 
 bool pal_hub_run_brush(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
-    int body = find_body(c, command), tool = pal_members_find(&c->room->members, c->id)->tool;
+    int body = find_body(c, command), tool = c->member->tool;
     if (body < 0) return false;
     if (tool < 0) return pal_hub_refuse(c, "tool", "%s: take a tool first", verb->name);
     pal_hub_tool_brush *h = &c->room->brush[tool], next = *h;

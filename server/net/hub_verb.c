@@ -46,8 +46,7 @@ static bool check_args(pal_client *c, const pal_verb *verb, const pal_wire_comma
 
 static bool check_right(pal_client *c, const pal_verb *verb)
 {
-    if (pal_members_find(&c->room->members, c->id)->muted)
-        return pal_hub_refuse(c, "muted", "%s: an instructor lets you watch only", verb->name);
+    if (c->member->muted) return pal_hub_refuse(c, "muted", "%s: an instructor lets you watch only", verb->name);
     return pal_hub_may(c, verb->right) ||
            pal_hub_refuse(c, "role", "%s: only for %s", verb->name, pal_right_text[verb->right]);
 }

@@ -92,9 +92,10 @@ static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_
     PAL_TRY(choose_address(options, &s->address, diag));
     if (options->health && options->health[0]) PAL_TRY(choose_health_address(s, options->health, diag));
     if (options->viewer_folder) PAL_TRY(pal_site_open(options->viewer_folder, diag, &s->site));
-    /* besides the members: sockets kept for the health listener, connections that do not join, page loads, and what lws
-     * needs itself */
+    /* besides members and viewers: sockets kept for the health listener, connections that do not join, page loads, and
+     * what lws needs itself */
     const int max_socket = s->address.max_socket = (options->max_clients > 0 ? options->max_clients : PAL_HUB_CLIENTS) +
+                                                   (options->max_viewers > 0 ? options->max_viewers : PAL_HUB_VIEWERS) +
                                                    PAL_UNJOINED_PLACES + 128 + PAL_HEALTH_SOCKETS;
     PAL_TRY(pal_loop_create(s->ops->sockets, max_socket, options->tls_certificate != NULL,
                             n_session ? pal_session_clock(session[0]) : &pal_clock_monotonic, diag, &s->loop));

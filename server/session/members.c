@@ -90,6 +90,15 @@ static int take_id(pal_member_list *members)
     return id;
 }
 
+void pal_members_name(const pal_member_list *members, const char *name, char unlike[PAL_MEMBER_NAME])
+{
+    char plain[PAL_MEMBER_NAME], full[PAL_MEMBER_NAME + 12];
+    clean_name(name, plain);
+    snprintf(full, sizeof full, "%s", plain);
+    for (int number = 2; name_taken(members, full); number++) snprintf(full, sizeof full, "%s %d", plain, number);
+    snprintf(unlike, PAL_MEMBER_NAME, "%.*s", PAL_MEMBER_NAME - 1, full);
+}
+
 pal_err pal_members_join(pal_member_list *members, pal_member_role role, const char *name, int *id)
 {
     pal_member_entry *entry = NULL;
@@ -98,12 +107,10 @@ pal_err pal_members_join(pal_member_list *members, pal_member_role role, const c
     for (int k = 0; k < PAL_MEMBER_LIST_MAX && !entry; k++)
         if (!members->member[k].id) entry = &members->member[k];
     if (!entry || members->n_member >= PAL_MEMBER_LIST_MAX - kept) return PAL_ERR_FULL;
-    char plain[PAL_MEMBER_NAME], full[PAL_MEMBER_NAME + 12];
-    clean_name(name, plain);
-    snprintf(full, sizeof full, "%s", plain);
-    for (int number = 2; name_taken(members, full); number++) snprintf(full, sizeof full, "%s %d", plain, number);
+    char unlike[PAL_MEMBER_NAME];
+    pal_members_name(members, name, unlike);
     *entry = (pal_member_entry){.id = take_id(members), .role = role, .tool = -1, .rights = members->rights};
-    snprintf(entry->name, sizeof entry->name, "%.*s", PAL_MEMBER_NAME - 1, full);
+    memcpy(entry->name, unlike, sizeof entry->name);
     members->n_member++;
     *id = entry->id;
     return PAL_ERR_OK;

@@ -8,7 +8,7 @@
 enum {
     PAL_MEMBER_LIST_MAX = 64,
     PAL_MEMBER_NAME = 48,
-    PAL_MEMBER_ID_MAX = 65535,
+    PAL_MEMBER_ID_MAX = 32767, /* those above are for who only watches */
     PAL_MEMBER_INSTRUCTORS = 4 /* places kept for them (test_members) */
 };
 
@@ -34,6 +34,8 @@ typedef struct pal_member_list {
 } pal_member_list;
 
 void pal_members_init(pal_member_list *members, int n_tool);
+/* the name as members see it, unlike that of any of them */
+void pal_members_name(const pal_member_list *members, const char *name, char unlike[PAL_MEMBER_NAME]);
 /* FULL: no free entry, or only those that are kept for instructors; STATE: the session is locked */
 pal_err pal_members_join(pal_member_list *members, pal_member_role role, const char *name, int *id);
 void pal_members_leave(pal_member_list *members, int id); /* releases the member's tool */

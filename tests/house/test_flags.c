@@ -110,6 +110,7 @@ static void flags_win_over_environment_over_file_over_defaults(void)
     CHECK_TEXT(config.listen, "127.0.0.1");
     CHECK(!config.allow_remote);
     CHECK_INT(config.max_clients, 200);
+    CHECK_INT(config.max_viewers, 1000);
     CHECK_INT(pal_config_log_level(&config), PAL_LOG_INFO);
     setenv("PALPATE_PORT", "2222", 1);
     setenv("PALPATE_ALLOW_REMOTE", "false", 1);

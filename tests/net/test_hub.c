@@ -541,10 +541,10 @@ static void strangers_are_turned_away(void)
     mem_pose(&early, 0, 1, at);
     CHECK_INT(pal_mem_code(early.peer), PAL_WIRE_CLOSE_POLICY); /* join comes first */
     mem_end(&early);
-    mem_join(&a, transport, "a", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
-    mem_join(&b, transport, "b", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&a, transport, "a", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
+    mem_join(&b, transport, "b", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
     mem_client third;
-    mem_join(&third, transport, "c", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&third, transport, "c", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
     CHECK_INT(pal_mem_code(third.peer), PAL_WIRE_CLOSE_FULL);
     for (int i = 0; i < 330 && !pal_mem_code(silent); i++) turn(&a, &b); /* 5.5 s */
     CHECK_INT(pal_mem_code(silent), PAL_WIRE_CLOSE_POLICY);

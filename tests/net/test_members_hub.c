@@ -7,12 +7,17 @@
 static small_scene organ;
 static char ticket[PAL_WIRE_ROLE_COUNT][PAL_TICKET_TEXT];
 
-static void begin(int max_clients)
+static void begin_with(int max_clients, int max_viewers)
 {
     served_guarded = true;
     served_begin(&organ.scene, (pal_session_options){.start_paused = true},
-                 (pal_server_options){.max_clients = max_clients});
+                 (pal_server_options){.max_clients = max_clients, .max_viewers = max_viewers});
     for (int r = 0; r < PAL_WIRE_ROLE_COUNT; r++) pal_server_start_ticket(server, (pal_wire_role)r, ticket[r]);
+}
+
+static void begin(int max_clients)
+{
+    begin_with(max_clients, 0);
 }
 
 /* a quarter of a second, in which all members hear what has changed */
@@ -242,8 +247,8 @@ static void who_fills_places_keeps_nobody_out(void)
     /* one address has so many members, and no more */
     int joined = 0;
     for (int i = 0; i < 40; i++) {
-        mem_connect(&full[i], transport, "192.0.2.1", ticket[PAL_WIRE_ROLE_VIEWER]);
-        mem_enter(&full[i], "crowd", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE, false);
+        mem_connect(&full[i], transport, "192.0.2.1", ticket[PAL_WIRE_ROLE_TRAINEE]);
+        mem_enter(&full[i], "crowd", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE, false);
         joined += pal_mem_code(full[i].peer) == 0;
     }
     CHECK_INT(joined, PAL_ADDRESS_PLACES);
@@ -267,6 +272,103 @@ static void places_are_kept_for_instructors(void)
     CHECK_INT(pal_mem_code(teacher.peer), 0);
     for (int i = 0; i < 16; i++) mem_end(&crowd[i]);
     mem_end(&teacher);
+    end();
+}
+
+/* does a page of the server hold this text? */
+static bool page_has(const char *path, const char *text)
+{
+    pal_reply reply;
+    pal_mem_get(transport, path, &reply);
+    char *body = strndup((const char *)reply.body->bytes, reply.body->n_byte);
+    const bool has = strstr(body, text) != NULL;
+    free(body);
+    pal_packet_drop(reply.body);
+    return has;
+}
+
+static void viewers_and_members_take_no_place_of_each_other(void)
+{
+    static mem_client viewer[8], trainee[8];
+    begin_with(8, 6);
+    for (int i = 0; i < 7; i++) join(&viewer[i], "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    for (int i = 0; i < 7; i++) CHECK_INT(pal_mem_code(viewer[i].peer), i < 6 ? 0 : PAL_WIRE_CLOSE_FULL);
+    /* of eight members two places are kept for instructors */
+    for (int i = 0; i < 7; i++) join(&trainee[i], "Tim", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
+    for (int i = 0; i < 7; i++) CHECK_INT(pal_mem_code(trainee[i].peer), i < 6 ? 0 : PAL_WIRE_CLOSE_FULL);
+    turn(&trainee[0], &viewer[0]);
+    CHECK_INT(trainee[0].last[PAL_CONTROL_STATUS].status.n_member, 6);
+    CHECK_INT(trainee[0].last[PAL_CONTROL_STATUS].status.n_viewer, 6);
+    CHECK_INT(trainee[0].last[PAL_CONTROL_MEMBERS].members.n_member, 12);
+    CHECK(page_has("/sessions", "\"members\":6,\"viewers\":6,"));
+    CHECK(page_has("/metrics", "palpate_clients{role=\"viewer\",transport=\"ws\"} 6\n"));
+    CHECK(page_has("/metrics", "palpate_clients{role=\"trainee\",transport=\"ws\"} 6\n"));
+    /* who leaves makes room for one of its kind */
+    mem_end(&trainee[0]);
+    join(&viewer[7], "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    CHECK_INT(pal_mem_code(viewer[7].peer), PAL_WIRE_CLOSE_FULL);
+    mem_end(&viewer[7]), mem_end(&viewer[0]);
+    join(&viewer[7], "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    CHECK_INT(pal_mem_code(viewer[7].peer), 0);
+    for (int i = 0; i < 8; i++) mem_end(&viewer[i]), mem_end(&trainee[i]);
+    end();
+}
+
+/* more viewers than `members` names: everybody has an id and the list, and who may act is always on it */
+static void a_crowd_of_viewers_leaves_the_members_listed(void)
+{
+    static mem_client viewer[100];
+    mem_client teacher, tim;
+    char args[64];
+    begin(0);
+    for (int i = 0; i < 100; i++) join(&viewer[i], "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    for (int i = 0; i < 100; i++) {
+        CHECK_INT(pal_mem_code(viewer[i].peer), 0);
+        CHECK(id_of(&viewer[i]) > PAL_MEMBER_ID_MAX);
+        for (int k = 0; k < i; k++) CHECK(id_of(&viewer[i]) != id_of(&viewer[k]));
+    }
+    join(&tim, "Tim", PAL_WIRE_ROLE_TRAINEE, 0);
+    join(&teacher, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    turn(&teacher, &viewer[99]);
+    CHECK_INT(teacher.last[PAL_CONTROL_STATUS].status.n_viewer, 100);
+    CHECK_INT(viewer[99].last[PAL_CONTROL_MEMBERS].members.n_member, PAL_WIRE_MEMBER_MAX);
+    CHECK_INT(member(&viewer[99], &tim)->tool, 0);
+    CHECK_INT(member(&viewer[99], &viewer[99])->id, 0);
+    CHECK_INT(member(&viewer[99], &viewer[0])->id, id_of(&viewer[0]));
+    /* an unlisted one that comes and goes is no news; it can be removed as any other */
+    const int before = teacher.n_text[PAL_CONTROL_MEMBERS];
+    snprintf(args, sizeof args, "\"member\":%d", id_of(&viewer[99]));
+    order(&teacher, "remove", "", args);
+    CHECK_INT(pal_mem_code(viewer[99].peer), PAL_WIRE_CLOSE_REMOVED);
+    turn(&teacher, NULL);
+    CHECK_INT(teacher.n_text[PAL_CONTROL_MEMBERS], before);
+    snprintf(args, sizeof args, "\"tool\":0,\"member\":%d", id_of(&viewer[0]));
+    order(&teacher, "hand_over", "", args);
+    turn(&teacher, NULL);
+    CHECK_TEXT(teacher.last[PAL_CONTROL_ERROR].error.text, "Eve is a viewer, who holds no tool");
+    for (int i = 0; i < 100; i++) mem_end(&viewer[i]);
+    mem_end(&teacher), mem_end(&tim);
+    end();
+}
+
+/* of one address of another machine come at most a quarter of the viewers, so that one keeps nobody out */
+static void viewers_of_one_address_keep_no_others_out(void)
+{
+    static mem_client crowd[60];
+    mem_client other;
+    int joined = 0;
+    begin_with(0, 200);
+    for (int i = 0; i < 60; i++) {
+        mem_connect(&crowd[i], transport, "192.0.2.1", "");
+        mem_enter(&crowd[i], "crowd", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE, false);
+        joined += pal_mem_code(crowd[i].peer) == 0;
+    }
+    CHECK_INT(joined, 200 / PAL_VIEWING_ADDRESSES);
+    mem_connect(&other, transport, "192.0.2.2", "");
+    mem_enter(&other, "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE, false);
+    CHECK_INT(pal_mem_code(other.peer), 0);
+    for (int i = 0; i < 60; i++) mem_end(&crowd[i]);
+    mem_end(&other);
     end();
 }
 
@@ -306,6 +408,9 @@ int main(void)
     RUN(an_instructor_mutes_removes_bans_and_locks);
     RUN(who_fills_places_keeps_nobody_out);
     RUN(places_are_kept_for_instructors);
+    RUN(viewers_and_members_take_no_place_of_each_other);
+    RUN(a_crowd_of_viewers_leaves_the_members_listed);
+    RUN(viewers_of_one_address_keep_no_others_out);
     RUN(members_are_reported_four_times_a_second);
     pal_prepared_free(&organ.mesh);
     return check_report();

@@ -55,6 +55,11 @@ export class AppState {
         return own?.role === "instructor" || (own?.rights ?? "").split(" ").includes(right);
     }
 
+    /** does this client only watch? A viewer may stand outside the list of members */
+    get watches() {
+        return (this.members.get(this.ownId)?.role ?? this.hello?.you.role) === "viewer";
+    }
+
     /** does a recording play, so that tools do not act? */
     get plays() {
         return this.status?.playback?.[0]?.plays === true;

@@ -85,6 +85,7 @@ export const SERVER_MESSAGES = Object.freeze(
             component_ms: "numbers",
             "components?": "texts",
             members: "u32",
+            "viewers?": "u32",
             bytes_s: "f64",
             rtt_ms: "f64",
             skipped_cycles: "u32",

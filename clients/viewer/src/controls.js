@@ -139,8 +139,7 @@ export class Controls {
         const { state } = this.page;
         const may = state.may("steer");
         // who only watches has no tools to choose and nothing to control
-        const watches = state.members.get(state.ownId)?.role === "viewer";
-        for (const id of ["modes", "pause", "reset"]) htmlById(id).hidden = watches;
+        for (const id of ["modes", "pause", "reset"]) htmlById(id).hidden = state.watches;
         const frozen = state.status?.frozen === true;
         for (const id of ["pause", "step"]) buttonById(id).disabled = !may;
         buttonById("reset").disabled = !may && !frozen;
@@ -154,7 +153,7 @@ export class Controls {
     showPaused(paused) {
         buttonById("pause").textContent = text(paused ? "tools.resume" : "tools.pause");
         buttonById("pause").setAttribute("aria-pressed", String(paused));
-        buttonById("step").hidden = !paused || this.page.state.members.get(this.page.state.ownId)?.role === "viewer";
+        buttonById("step").hidden = !paused || this.page.state.watches;
         this.showRights();
     }
 

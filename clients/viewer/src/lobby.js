@@ -11,7 +11,7 @@ const SLOW = 1.05; // slowdown that still counts as real time
 /**
  * @typedef {{
  *   name: string, title: string, state: "running" | "paused" | "recording" | "opening" | "failed", text?: string,
- *   members?: number, tools?: number, free_tools?: number, slowdown?: number, assets?: string[],
+ *   members?: number, viewers?: number, tools?: number, free_tools?: number, slowdown?: number, assets?: string[],
  *   people?: {name: string, role: string}[]
  * }} Session
  * @typedef {{sessions: Session[], scenes?: string[]}} List scenes: of those who may open them
@@ -31,9 +31,10 @@ export function stateText({ state, slowdown = 1, text }) {
 }
 
 /** @param {Session} session @returns {string} */
-export function peopleText({ people, members = 0 }) {
-    if (!members) return textOf("lobby.nobody");
-    if (!people?.length) return members === 1 ? textOf("lobby.member") : textOf("lobby.members", { n: members });
+export function peopleText({ people, members = 0, viewers = 0 }) {
+    const n = members + viewers;
+    if (!n) return textOf("lobby.nobody");
+    if (!people?.length) return n === 1 ? textOf("lobby.member") : textOf("lobby.members", { n });
     return people
         .map(({ name, role }) =>
             role === "trainee"

@@ -265,7 +265,7 @@ export class Messages {
         const { input, state } = this.page;
         input.enabled = state.ownTool >= 0 && !state.plays;
         const hint = htmlById("hint");
-        if (!input.enabled && state.members.has(state.ownId)) {
+        if (!input.enabled && (state.watches || state.members.has(state.ownId))) {
             hint.classList.remove("gone");
             hint.textContent = this.watchingText();
         } else if (!hint.classList.contains("gone")) hint.textContent = textOf("hint.drag");
@@ -275,7 +275,7 @@ export class Messages {
     watchingText() {
         const own = this.page.state.members.get(this.page.state.ownId);
         if (this.page.state.plays) return textOf("hint.recording");
-        if (own?.role === "viewer") return textOf("hint.watching");
+        if (this.page.state.watches) return textOf("hint.watching");
         if (own?.muted) return textOf("hint.muted");
         return textOf("hint.full");
     }

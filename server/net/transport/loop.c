@@ -9,6 +9,10 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
+
+/* files beside sockets: logs, recordings, scenes that are read */
+enum { OTHER_FILES = 256 };
 
 struct pal_loop {
     struct lws_context *context;
@@ -56,10 +60,20 @@ static void wake_due(lws_sorted_usec_list_t *timer)
     if (loop->events.wake) loop->events.wake(loop->events.user);
 }
 
+/* systems begin with some hundred files a process and let it raise that; what is refused shows when they are used up */
+static void allow_files(int n)
+{
+    struct rlimit limit;
+    if (getrlimit(RLIMIT_NOFILE, &limit) || limit.rlim_cur >= (rlim_t)n) return;
+    limit.rlim_cur = (rlim_t)n < limit.rlim_max ? (rlim_t)n : limit.rlim_max;
+    (void)setrlimit(RLIMIT_NOFILE, &limit);
+}
+
 static pal_err open_context(pal_loop *loop, int max_socket, bool tls, pal_diagnostic *diag)
 {
     struct lws_context_creation_info info;
     memset(&info, 0, sizeof info);
+    allow_files(max_socket + OTHER_FILES);
     lws_set_log_level(LLL_ERR | LLL_WARN, lws_line);
     /* with it every host loads the certificates of all authorities, and only one that speaks TLS frees them */
     info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS | (tls ? LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT : 0);
