@@ -8,6 +8,7 @@
 
 static const pal_command_entry command[] = {
     {"serve", "serve scenes, surfaces or label volumes as sessions, with the viewer", command_serve},
+    {"relay", "show a session of a server to many viewers", command_relay},
     {"ticket", "make a ticket that lets its bearer join a server", command_ticket},
     {"prepare", "make a scene from a surface or a segmented scan", command_prepare},
     {"cells", "make the control cells of a subdivision solid", command_cells},

@@ -356,7 +356,7 @@ static void net_send_status(void *user)
 
 static pal_err net_open_ws(pal_bridge_net *n, pal_diagnostic *diag)
 {
-    static const pal_link_events events = {ws_state, ws_control, ws_message, NULL};
+    static const pal_link_events events = {.state = ws_state, .control = ws_control, .message = ws_message};
     n->store = pal_asset_store_create(n->loop, n->o.server, net_asset, n);
     if (!n->store) return PAL_ERR_MEMORY;
     const pal_link_options link = {.url = n->o.server,

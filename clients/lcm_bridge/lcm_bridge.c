@@ -311,7 +311,7 @@ static void tool_state(void *user, pal_link_state state, int code, const char *r
     if (state == PAL_LINK_ENDED) pal_log(PAL_LOG_WARN, "lcm_tool", "tool %d: %d %s", tool->index, code, reason);
 }
 
-static const pal_link_events tool_events = {tool_state, tool_control, tool_message, NULL};
+static const pal_link_events tool_events = {.state = tool_state, .control = tool_control, .message = tool_message};
 
 static void tool_open(pal_lcm_bridge *b, bridge_tool *tool)
 {
@@ -454,7 +454,8 @@ static void bridge_tidy(void *user)
 pal_err pal_lcm_bridge_open(pal_link_loop *loop, const pal_lcm_bridge_options *options, pal_diagnostic *diag,
                             pal_lcm_bridge **out)
 {
-    static const pal_link_events watcher_events = {watcher_state, watcher_control, watcher_message, NULL};
+    static const pal_link_events watcher_events = {
+        .state = watcher_state, .control = watcher_control, .message = watcher_message};
     static const pal_lcm_events lcm_events = {bridge_lcm_wants, bridge_lcm_message, bridge_lcm_refused};
     pal_lcm_bridge *b = calloc(1, sizeof *b);
     if (!b) return PAL_ERR_MEMORY;

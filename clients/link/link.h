@@ -48,7 +48,9 @@ typedef enum pal_link_state {
 typedef struct pal_link_events {
     /* reason: a sentence for the user; code: websocket close code, 0: none */
     void (*state)(void *user, pal_link_state state, int code, const char *reason);
-    /* every well-formed text message of the server; hello too, before state JOINED */
+    /* every well-formed text message of the server, decoded and as it came; before control */
+    void (*text)(void *user, const pal_control *c, const char *text, size_t n_byte);
+    /* the same without its text; hello too, before state JOINED */
     void (*control)(void *user, const pal_control *c);
     /* every whole binary message of a server kind with a valid header; the body is unchecked */
     void (*message)(void *user, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte);

@@ -301,6 +301,7 @@ static void link_text(pal_link *link)
         link->pause_ms = LINK_PAUSE_FIRST_MS;
         link->count.joins++;
     }
+    if (link->o.events->text) link->o.events->text(link->o.user, &link->control, (const char *)link->in.at, link->in.n);
     if (link->o.events->control) link->o.events->control(link->o.user, &link->control);
     if (hello && !link->closing) link_report(link, PAL_LINK_JOINED, "");
 }

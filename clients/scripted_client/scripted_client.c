@@ -553,7 +553,8 @@ pal_err pal_scripted_client_open(pal_link_loop *loop, pal_asset_store *store,
                                  const pal_scripted_client_options *options, pal_diagnostic *diag,
                                  pal_scripted_client **out)
 {
-    static const pal_link_events events = {client_on_state, client_on_control, client_on_message, client_on_fault};
+    static const pal_link_events events = {
+        .state = client_on_state, .control = client_on_control, .message = client_on_message, .fault = client_on_fault};
     pal_scripted_client *t = calloc(1, sizeof *t);
     if (!t) return PAL_ERR_MEMORY;
     *t = (pal_scripted_client){.store = store, .options = *options, .result.tool = PAL_WIRE_TOOL_NONE};

@@ -19,6 +19,7 @@ int command_replay(int argc, char **argv);
 int command_solve(int argc, char **argv);
 int command_calibrate(int argc, char **argv);
 int command_study(int argc, char **argv);
+int command_relay(int argc, char **argv);
 int command_robustness(int argc, char **argv);
 
 #endif

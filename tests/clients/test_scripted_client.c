@@ -13,7 +13,7 @@
 
 static void addresses_are_understood_or_refused_by_name(void)
 {
-    static const pal_link_events events = {NULL, NULL, NULL, NULL};
+    static const pal_link_events events = {.state = NULL};
     pal_link_loop *loop = NULL;
     REQUIRE(pal_link_loop_create(&loop) == PAL_ERR_OK);
     const char *const good[] = {
@@ -61,7 +61,7 @@ static void on_tick(void *user)
 /* nobody listens on port 1: tries follow each other with growing pauses, other work goes on meanwhile */
 static void link_without_a_server_tries_again_and_blocks_nobody(void)
 {
-    static const pal_link_events events = {on_state, NULL, NULL, NULL};
+    static const pal_link_events events = {.state = on_state};
     seen s = {0};
     pal_link *link = NULL;
     REQUIRE(pal_link_loop_create(&s.loop) == PAL_ERR_OK);

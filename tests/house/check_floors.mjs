@@ -27,7 +27,7 @@ const floors = [
     ["server/calibrate", "server/robustness", "server/session"],
     ["server/study"],
     ["server/net/transport", "server/net/admission"],
-    ["server/net"],
+    ["server/net", "clients/relay"],
     ["server/bench", "server/commands"],
     ["server"],
 ];
@@ -36,6 +36,7 @@ const narrow = {
     protocol: [],
     "clients/link": ["protocol", "server/base", "lcmtypes"],
     "clients/*": ["clients/link", "server/rendering", "protocol", "server/base", "lcmtypes"],
+    "clients/relay": ["clients/link", "server/net/transport", "server/net/admission", "protocol", "server/base"],
     "server/net/transport": ["protocol", "server/base"],
     "server/net/admission": ["protocol", "server/base"],
     "server/rendering": ["protocol", "server/base"],
@@ -70,7 +71,7 @@ function may(from, to) {
     if (from === to) return true;
     if (!level.has(from) || !level.has(to) || level.get(to) >= level.get(from)) return false;
     const client = from.startsWith("clients/") && from !== "clients/link";
-    const seen = narrow[client ? "clients/*" : from];
+    const seen = narrow[from] ?? narrow[client ? "clients/*" : from];
     if (seen) return seen.some((s) => to === s || (s.endsWith("/") && to.startsWith(s)));
     return (
         !to.startsWith("clients/") &&

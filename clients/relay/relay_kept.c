@@ -1,0 +1,267 @@
+#include "clients/relay/relay_kept.h"
+
+#include "protocol/asset.h"
+#include "protocol/frame_codec.h"
+#include "server/base/log.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+void pal_relay_kept_init(pal_relay_kept *k, void (*changed)(void *user), void *user)
+{
+    memset(k, 0, sizeof *k);
+    pthread_mutex_init(&k->lock, NULL);
+    k->changed = changed, k->changed_user = user;
+}
+
+void pal_relay_kept_fetch_by(pal_relay_kept *k, void (*want)(void *user, const char *path), void *user)
+{
+    k->want = want, k->want_user = user;
+}
+
+/* ---- messages ---- */
+
+/* takes the reference */
+static void keep(pal_relay_kept *k, pal_relay_message *place, pal_packet *packet)
+{
+    pal_packet_replace(&place->packet, packet);
+    place->number = packet ? ++k->number : 0;
+}
+
+static void drop_orders(pal_relay_kept *k)
+{
+    for (int i = 0; i < PAL_RELAY_ORDERS; i++) pal_packet_replace(&k->order[i], NULL);
+    k->n_order = 0;
+}
+
+/* what viewers know holds no more */
+static void begin_run(pal_relay_kept *k)
+{
+    for (int i = 0; i < PAL_RELAY_KINDS; i++) keep(k, &k->text[i], NULL);
+    for (int i = 0; i < PAL_RELAY_MEMBERS; i++) pal_packet_replace(&k->announced[i], NULL);
+    for (int p = 0; p < PAL_WIRE_PART_MAX; p++) {
+        keep(k, &k->frame[p], NULL);
+        pal_packet_replace(&k->coming[p], NULL);
+        k->epoch[p] = 0;
+    }
+    keep(k, &k->tools, NULL);
+    drop_orders(k);
+    k->names[PAL_RELAY_TOPOLOGY].n_path = k->before.n_path = 0;
+    k->run++;
+}
+
+/* the FRAMEs of a closed cycle, of what is shown */
+static void show_frames(pal_relay_kept *k)
+{
+    for (int p = 0; p < PAL_WIRE_PART_MAX; p++) {
+        if (!k->coming[p] || k->coming_epoch[p] != k->epoch[p]) continue;
+        keep(k, &k->frame[p], k->coming[p]);
+        k->coming[p] = NULL;
+    }
+}
+
+/* ---- assets ---- */
+
+static pal_relay_asset *find(const pal_relay_kept *k, const char *path)
+{
+    pal_relay_asset *a = k->asset;
+    while (a && strcmp(a->path, path)) a = a->next;
+    return a;
+}
+
+static bool names(const pal_relay_names *n, const char *path)
+{
+    for (int i = 0; i < n->n_path; i++)
+        if (!strcmp(n->path[i], path)) return true;
+    return false;
+}
+
+static void forget_assets(pal_relay_kept *k)
+{
+    for (pal_relay_asset **at = &k->asset, *a; (a = *at);) {
+        if (names(&k->names[PAL_RELAY_HELLO], a->path) || names(&k->names[PAL_RELAY_TOPOLOGY], a->path) ||
+            names(&k->before, a->path)) {
+            at = &a->next;
+            continue;
+        }
+        *at = a->next;
+        pal_packet_drop(a->bytes);
+        free(a);
+    }
+}
+
+static void add_name(pal_relay_names *n, const char *path)
+{
+    if (!path[0] || names(n, path)) return;
+    snprintf(n->path[n->n_path++], sizeof *n->path, "%s", path);
+}
+
+static void read_names(pal_relay_names *n, const pal_wire_part_info *part, uint32_t n_part)
+{
+    n->n_part = n_part, n->n_path = 0;
+    for (uint32_t p = 0; p < n_part; p++) {
+        n->epoch[p] = part[p].epoch;
+        add_name(n, part[p].asset);
+        add_name(n, part[p].interior);
+        add_name(n, part[p].control_cells);
+        for (uint32_t i = 0; i < part[p].n_image; i++) add_name(n, part[p].image[i]);
+    }
+}
+
+/* ---- hello and topology ---- */
+
+/* shows what is announced and complete: hello before topology */
+static void show(pal_relay_kept *k)
+{
+    for (int i = 0; i < PAL_RELAY_MEMBERS && (i == PAL_RELAY_HELLO || k->text[PAL_RELAY_HELLO].packet); i++) {
+        const pal_relay_names *n = &k->names[i];
+        bool complete = k->announced[i] != NULL;
+        for (int a = 0; complete && a < n->n_path; a++) complete = find(k, n->path[a]) != NULL;
+        if (!complete) continue;
+        keep(k, &k->text[i], k->announced[i]);
+        k->announced[i] = NULL;
+        memcpy(k->epoch, n->epoch, sizeof *k->epoch * n->n_part);
+        show_frames(k);
+        /* a session that is paused may send no cycle soon */
+        if (k->tools.packet) k->tools.number = ++k->number;
+        forget_assets(k);
+    }
+}
+
+/* is this the run that viewers know, with the parts that they know? */
+static bool is_same_run(const pal_relay_kept *k, const pal_wire_hello *h)
+{
+    bool same = k->text[PAL_RELAY_HELLO].packet && h->started == k->started && !strcmp(h->session, k->session) &&
+                h->n_part == k->names[PAL_RELAY_HELLO].n_part && !k->announced[PAL_RELAY_TOPOLOGY];
+    for (uint32_t p = 0; same && p < h->n_part; p++)
+        same = h->part[p].epoch == k->epoch[p] && find(k, h->part[p].asset);
+    return same;
+}
+
+static void take_hello(pal_relay_kept *k, const pal_wire_hello *h, pal_packet *packet)
+{
+    if (!is_same_run(k, h)) begin_run(k);
+    k->started = h->started;
+    k->frame_rate_hz = h->frame_rate_hz;
+    snprintf(k->session, sizeof k->session, "%s", h->session);
+    snprintf(k->title, sizeof k->title, "%s", h->title);
+    k->up = true;
+    pal_packet_replace(&k->announced[PAL_RELAY_HELLO], packet);
+    read_names(&k->names[PAL_RELAY_HELLO], h->part, h->n_part);
+}
+
+static void take_topology(pal_relay_kept *k, const pal_wire_topology *t, pal_packet *packet)
+{
+    if (!k->announced[PAL_RELAY_TOPOLOGY]) k->before = k->names[PAL_RELAY_TOPOLOGY];
+    pal_packet_replace(&k->announced[PAL_RELAY_TOPOLOGY], packet);
+    read_names(&k->names[PAL_RELAY_TOPOLOGY], t->part, t->n_part);
+}
+
+/* ---- from upstream ---- */
+
+void pal_relay_take_text(pal_relay_kept *k, const pal_control *c, const char *text, size_t n_byte)
+{
+    const bool passed = c->type == PAL_CONTROL_HELLO || c->type == PAL_CONTROL_TOPOLOGY ||
+                        c->type == PAL_CONTROL_MEMBERS || c->type == PAL_CONTROL_STATUS ||
+                        c->type == PAL_CONTROL_ORDERS;
+    pal_packet *packet = passed ? pal_packet_create(text, n_byte, true) : NULL;
+    if (!packet) return;
+    pthread_mutex_lock(&k->lock);
+    if (c->type == PAL_CONTROL_HELLO)
+        take_hello(k, &c->hello, packet);
+    else if (c->type == PAL_CONTROL_TOPOLOGY)
+        take_topology(k, &c->topology, packet);
+    else if (c->type == PAL_CONTROL_ORDERS)
+        pal_packet_replace(&k->order[k->n_order++ % PAL_RELAY_ORDERS], packet);
+    else
+        keep(k, &k->text[c->type == PAL_CONTROL_MEMBERS ? PAL_RELAY_MEMBERS : PAL_RELAY_STATUS], packet);
+    show(k);
+    pthread_mutex_unlock(&k->lock);
+    if (c->type == PAL_CONTROL_HELLO || c->type == PAL_CONTROL_TOPOLOGY) pal_relay_want_missing(k);
+    k->changed(k->changed_user);
+}
+
+static void take_frame(pal_relay_kept *k, const uint8_t *bytes, size_t n_byte)
+{
+    pal_frame_head head;
+    if (pal_frame_get_head(bytes, n_byte, &head) || head.part >= PAL_WIRE_PART_MAX) return;
+    if ((int32_t)(head.epoch - k->epoch[head.part]) < 0) return;
+    pal_packet_replace(&k->coming[head.part], pal_packet_create(bytes, n_byte, false));
+    k->coming_epoch[head.part] = head.epoch;
+}
+
+static void take_tools(pal_relay_kept *k, const uint8_t *bytes, size_t n_byte)
+{
+    pal_wire_tools tools;
+    pal_packet *packet = pal_wire_get_tools(bytes, n_byte, &tools) ? NULL : pal_packet_create(bytes, n_byte, false);
+    if (!packet) return;
+    pthread_mutex_lock(&k->lock);
+    show_frames(k);
+    keep(k, &k->tools, packet);
+    k->cycle = tools.cycle;
+    pthread_mutex_unlock(&k->lock);
+    k->changed(k->changed_user);
+}
+
+void pal_relay_take_message(pal_relay_kept *k, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
+{
+    if (head->kind == PAL_WIRE_FRAME) take_frame(k, bytes, n_byte);
+    if (head->kind == PAL_WIRE_TOOLS) take_tools(k, bytes, n_byte);
+}
+
+pal_err pal_relay_take_asset(pal_relay_kept *k, const char *path, const uint8_t *bytes, size_t n_byte)
+{
+    char hash[PAL_ASSET_HASH_CHARS];
+    const char *slash = strrchr(path, '/');
+    pal_asset_hash(bytes, n_byte, hash);
+    if (!slash || strcmp(slash + 1, hash)) return PAL_ERR_REFUSED;
+    pal_relay_asset *a = calloc(1, sizeof *a);
+    pal_packet *packet = pal_packet_create(bytes, n_byte, false);
+    if (!a || !packet) {
+        free(a);
+        pal_packet_drop(packet);
+        return PAL_ERR_MEMORY;
+    }
+    snprintf(a->path, sizeof a->path, "%s", path);
+    a->bytes = packet;
+    pthread_mutex_lock(&k->lock);
+    a->next = k->asset;
+    k->asset = a;
+    show(k);
+    pthread_mutex_unlock(&k->lock);
+    k->changed(k->changed_user);
+    return PAL_ERR_OK;
+}
+
+void pal_relay_want_missing(pal_relay_kept *k)
+{
+    /* [up] alone adds and drops assets and names */
+    for (int i = 0; i < PAL_RELAY_MEMBERS; i++)
+        for (int a = 0; k->announced[i] && a < k->names[i].n_path; a++)
+            if (!find(k, k->names[i].path[a])) k->want(k->want_user, k->names[i].path[a]);
+}
+
+void pal_relay_lost(pal_relay_kept *k)
+{
+    pthread_mutex_lock(&k->lock);
+    k->up = false;
+    pthread_mutex_unlock(&k->lock);
+}
+
+pal_packet *pal_relay_find_asset(pal_relay_kept *k, const char *path)
+{
+    pthread_mutex_lock(&k->lock);
+    const pal_relay_asset *a = find(k, path);
+    pal_packet *bytes = a ? pal_packet_hold(a->bytes) : NULL;
+    pthread_mutex_unlock(&k->lock);
+    return bytes;
+}
+
+void pal_relay_kept_free(pal_relay_kept *k)
+{
+    begin_run(k);
+    k->names[PAL_RELAY_HELLO].n_path = 0;
+    forget_assets(k);
+    pthread_mutex_destroy(&k->lock);
+}

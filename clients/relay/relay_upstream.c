@@ -1,0 +1,127 @@
+#include "clients/relay/relay_upstream.h"
+
+#include "clients/relay/tuning.h"
+#include "protocol/asset.h"
+#include "server/base/log.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* an asset on its way */
+typedef struct fetch {
+    pal_relay_upstream *of;
+    struct fetch *next;
+    char path[PAL_WIRE_NAME_BYTES];
+} fetch;
+
+struct pal_relay_upstream {
+    pal_link_loop *loop;
+    pal_link *link;
+    pal_relay_kept *kept;
+    char url[512];
+    fetch *fetches;
+    int end_code;
+    char end_reason[128];
+};
+
+static void got(void *user, int status, const uint8_t *bytes, size_t n_byte, const char *reason)
+{
+    fetch *f = user;
+    pal_relay_upstream *u = f->of;
+    for (fetch **at = &u->fetches; *at; at = &(*at)->next)
+        if (*at == f) {
+            *at = f->next;
+            break;
+        }
+    if (status != 200)
+        pal_log(PAL_LOG_WARN, "asset", "%s does not come: %s", f->path, reason && reason[0] ? reason : "refused");
+    else if (pal_relay_take_asset(u->kept, f->path, bytes, n_byte))
+        pal_log(PAL_LOG_WARN, "asset", "%s is not what its name says", f->path);
+    free(f);
+}
+
+static void want(void *user, const char *path)
+{
+    pal_relay_upstream *u = user;
+    for (const fetch *f = u->fetches; f; f = f->next)
+        if (!strcmp(f->path, path)) return;
+    fetch *f = calloc(1, sizeof *f);
+    if (!f) return;
+    *f = (fetch){.of = u, .next = u->fetches};
+    snprintf(f->path, sizeof f->path, "%s", path);
+    u->fetches = f;
+    /* the URL has been read before: only memory can fail, and the next try comes */
+    if (pal_link_get(u->loop, u->url, path, PAL_ASSET_BYTES_MAX, got, f, NULL)) {
+        u->fetches = f->next;
+        free(f);
+    }
+}
+
+static void fetch_missing(void *user)
+{
+    pal_relay_want_missing(((pal_relay_upstream *)user)->kept);
+}
+
+static void state(void *user, pal_link_state now, int code, const char *reason)
+{
+    pal_relay_upstream *u = user;
+    if (now == PAL_LINK_JOINED) pal_log(PAL_LOG_INFO, "upstream", "%s is relayed", u->kept->session);
+    if (now != PAL_LINK_LOST && now != PAL_LINK_ENDED) return;
+    pal_log(PAL_LOG_WARN, "upstream", "lost: %s", reason[0] ? reason : "no connection");
+    pal_relay_lost(u->kept);
+    if (now == PAL_LINK_LOST) return;
+    u->end_code = code ? code : PAL_WIRE_CLOSE_GOING_AWAY;
+    snprintf(u->end_reason, sizeof u->end_reason, "%s", reason);
+    pal_link_stop(u->loop);
+}
+
+static void text(void *user, const pal_control *decoded, const char *bytes, size_t n_byte)
+{
+    pal_relay_take_text(((pal_relay_upstream *)user)->kept, decoded, bytes, n_byte);
+}
+
+static void message(void *user, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
+{
+    pal_relay_upstream *u = user;
+    pal_relay_take_message(u->kept, head, bytes, n_byte);
+    if (head->kind == PAL_WIRE_TOOLS) pal_link_acknowledge(u->link, bytes, n_byte);
+}
+
+pal_err pal_relay_upstream_open(pal_link_loop *loop, const char *url, pal_relay_kept *kept, pal_diagnostic *diag,
+                                pal_relay_upstream **out)
+{
+    static const pal_link_events events = {.state = state, .text = text, .message = message};
+    pal_relay_upstream *u = calloc(1, sizeof *u);
+    if (!u) return PAL_ERR_MEMORY;
+    *u = (pal_relay_upstream){.loop = loop, .kept = kept};
+    snprintf(u->url, sizeof u->url, "%s", url);
+    pal_relay_kept_fetch_by(kept, want, u);
+    const pal_link_options options = {.url = url,
+                                      .name = "relay",
+                                      .role = PAL_WIRE_ROLE_VIEWER,
+                                      .tool = PAL_WIRE_TOOL_NONE,
+                                      .events = &events,
+                                      .user = u};
+    pal_err err = pal_link_open(loop, &options, diag, &u->link);
+    if (!err && !pal_link_add_timer(loop, PAL_RELAY_FETCH_US, fetch_missing, u)) err = PAL_ERR_MEMORY;
+    if (err) return pal_relay_upstream_close(u), err;
+    *out = u;
+    return PAL_ERR_OK;
+}
+
+int pal_relay_upstream_ended(const pal_relay_upstream *u, const char **reason)
+{
+    *reason = u->end_reason;
+    return u->end_code;
+}
+
+void pal_relay_upstream_close(pal_relay_upstream *u)
+{
+    if (!u) return;
+    for (fetch *f = u->fetches, *after; f; f = after) {
+        after = f->next;
+        free(f);
+    }
+    free(u);
+}

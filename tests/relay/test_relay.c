@@ -1,0 +1,313 @@
+/* A relay between a hub and its viewers, all in this process: the relay's client of the hub hands every message on as
+ * it came, as the link does, and viewers on the relay's own transport decode it. */
+#include "clients/relay/relay_viewers.h"
+#include "clients/relay/tuning.h"
+#include "tests/net/hub_scene.h"
+#include "tests/net/server_fixture.h"
+
+static small_scene organ;
+static pal_relay_kept kept;
+static pal_loop *loop;
+static pal_relay_viewers *viewers;
+static pal_transport *down;
+static pal_mem_peer *up;
+static bool asset_late; /* upstream's assets do not come yet */
+
+static void no_news(void *user)
+{
+    (void)user;
+}
+
+static void fetch(void *user, const char *path)
+{
+    pal_reply reply;
+    (void)user;
+    if (asset_late) return;
+    pal_mem_get(transport, path, &reply);
+    CHECK_INT(reply.status, 200);
+    CHECK_INT(pal_relay_take_asset(&kept, path, reply.body->bytes, reply.body->n_byte), PAL_ERR_OK);
+    pal_packet_drop(reply.body);
+}
+
+static void connect_up(void)
+{
+    static const char join[] = "{\"type\":\"join\",\"name\":\"relay\",\"role\":\"viewer\",\"tool\":null}";
+    up = pal_mem_connect(transport, "");
+    pal_mem_send(up, join, strlen(join), true);
+}
+
+/* all that upstream has for the relay */
+static void pass(void)
+{
+    static pal_control message;
+    for (const pal_packet *p; (p = pal_mem_receive(up));) {
+        pal_wire_head head;
+        if (p->text) {
+            CHECK_INT(pal_control_get((const char *)p->bytes, p->n_byte, true, &message), 0);
+            pal_relay_take_text(&kept, &message, (const char *)p->bytes, p->n_byte);
+            continue;
+        }
+        CHECK_INT(pal_wire_get_head(p->bytes, p->n_byte, &head), 0);
+        pal_relay_take_message(&kept, &head, p->bytes, p->n_byte);
+        if (head.kind != PAL_WIRE_TOOLS) continue;
+        pal_wire_tools tools;
+        uint8_t ack[PAL_WIRE_ACK_BYTES];
+        CHECK_INT(pal_wire_get_tools(p->bytes, p->n_byte, &tools), 0);
+        pal_wire_put_ack(ack, sizeof ack, &(pal_wire_ack){.cycle = tools.cycle});
+        pal_mem_send(up, ack, sizeof ack, false);
+    }
+    pal_loop_advance(loop);
+}
+
+static void begin(bool paused, pal_relay_options options)
+{
+    pal_peer_events events;
+    pal_listen_address nowhere = {.ip = ""};
+    pal_diagnostic diag = {""};
+    served_begin(&organ.scene, (pal_session_options){.start_paused = paused}, (pal_server_options){.max_viewers = 8});
+    pal_relay_kept_init(&kept, no_news, NULL);
+    pal_relay_kept_fetch_by(&kept, fetch, NULL);
+    CHECK_INT(pal_loop_create(false, 0, false, &served_clock.clock, &diag, &loop), PAL_ERR_OK);
+    CHECK_INT(pal_relay_viewers_create(loop, &kept, &options, &diag, &viewers), PAL_ERR_OK);
+    pal_relay_viewers_events(viewers, &events);
+    CHECK_INT(pal_mem_transport.open(loop, &nowhere, &events, &diag, &down), PAL_ERR_OK);
+    connect_up();
+    pass();
+}
+
+static void end_relay(void)
+{
+    pal_mem_leave(up);
+    pal_mem_transport.close(down);
+    pal_relay_viewers_destroy(viewers);
+    pal_relay_kept_free(&kept);
+    pal_loop_destroy(loop);
+    end();
+}
+
+static void turn(uint64_t ns, mem_client *direct, mem_client *a, mem_client *b)
+{
+    served_turn(ns, direct, NULL);
+    pass();
+    if (a) mem_pull(a, 1000);
+    if (b) mem_pull(b, 1000);
+}
+
+static void same_shape(const mem_client *a, const mem_client *b)
+{
+    CHECK_INT(a->frame.seq, b->frame.seq);
+    CHECK_INT(a->tools.cycle, b->tools.cycle);
+    CHECK_INT(memcmp(a->position_m, b->position_m, a->asset->order->n_vertex * 3 * sizeof(float)), 0);
+}
+
+/* two viewers see to the bit what a client of the server sees, while a trainee presses */
+static void viewers_see_what_the_server_sends(void)
+{
+    mem_client direct, a, b;
+    begin(false, (pal_relay_options){.max_viewers = 4});
+    mem_join(&direct, transport, "Tim", PAL_WIRE_ROLE_TRAINEE, 0);
+    mem_pull(&direct, 1000);
+    mem_join(&a, down, "Ada", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&b, down, "Bo", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    const double top_m[3] = {0, 0, 0.04};
+    for (uint32_t i = 1; i <= 60; i++) {
+        mem_pose(&direct, 0, i, top_m);
+        turn(FRAME_NS, &direct, &a, &b);
+    }
+    CHECK(direct.n_frame > 5);
+    CHECK_INT(a.n_bad + b.n_bad + direct.n_bad, 0);
+    CHECK_INT(a.n_text[PAL_CONTROL_HELLO], 1);
+    CHECK(a.n_text[PAL_CONTROL_STATUS] > 1 && a.n_text[PAL_CONTROL_MEMBERS] > 0);
+    CHECK_TEXT(a.last[PAL_CONTROL_HELLO].hello.session, "small");
+    CHECK_INT(a.last[PAL_CONTROL_HELLO].hello.you_role, PAL_WIRE_ROLE_VIEWER);
+    CHECK_INT(a.tools.n_tool, direct.tools.n_tool);
+    CHECK_INT(a.tools.tool[0].flags & PAL_WIRE_TOOL_HELD, PAL_WIRE_TOOL_HELD);
+    same_shape(&a, &direct), same_shape(&b, &direct);
+    /* the server has a member and one viewer, however many there are behind it */
+    CHECK_INT(direct.last[PAL_CONTROL_STATUS].status.n_member, 1);
+    CHECK_INT(direct.last[PAL_CONTROL_STATUS].status.n_viewer, 1);
+    CHECK_INT(pal_relay_viewers_count(viewers)->n_viewer, 2);
+    mem_end(&a), mem_end(&b), mem_end(&direct);
+    end_relay();
+}
+
+/* nothing moves, so nothing comes from upstream: the newest frame is there all the same */
+static void a_newcomer_gets_a_key_frame_of_a_part_at_rest(void)
+{
+    mem_client direct, late;
+    begin(true, (pal_relay_options){.max_viewers = 4});
+    mem_join(&direct, transport, "Tim", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
+    for (int i = 0; i < 10; i++) turn(FRAME_NS, &direct, NULL, NULL);
+    mem_join(&late, down, "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_pull(&late, 1000); /* without a turn of the server */
+    CHECK_INT(late.n_text[PAL_CONTROL_HELLO], 1);
+    CHECK_INT(late.n_frame, 1);
+    CHECK_INT(late.n_tools, 1);
+    CHECK_INT(late.n_bad, 0);
+    CHECK_INT(memcmp(late.position_m, direct.position_m, late.asset->order->n_vertex * 3 * sizeof(float)), 0);
+    mem_end(&late), mem_end(&direct);
+    end_relay();
+}
+
+/* one that acknowledges nothing gets its credit and no more; the other sees every cycle */
+static void a_slow_viewer_costs_the_others_nothing(void)
+{
+    mem_client fast, deaf, direct;
+    begin(false, (pal_relay_options){.max_viewers = 4});
+    mem_join(&direct, transport, "Tim", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
+    mem_join(&fast, down, "fast", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&deaf, down, "deaf", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    deaf.mute = true;
+    for (int i = 0; i < 300; i++) turn(FRAME_NS, &direct, &fast, &deaf);
+    CHECK_LE(deaf.n_tools, PAL_CREDIT_MAX);
+    CHECK_LE(direct.n_tools - fast.n_tools, 2);
+    CHECK_INT(fast.tools.cycle, direct.tools.cycle);
+    const size_t held = pal_packet_total();
+    for (int i = 0; i < 240; i++) turn(FRAME_NS, &direct, &fast, &deaf);
+    CHECK_LE((double)pal_packet_total(), 2.0 * (double)held); /* nothing waits for it */
+    CHECK(deaf.n_text[PAL_CONTROL_STATUS] > 20);              /* control goes on */
+    for (int i = 0; i < 240 && !pal_mem_code(deaf.peer); i++) turn(FRAME_NS, &direct, &fast, &deaf);
+    CHECK_INT(pal_mem_code(deaf.peer), PAL_WIRE_CLOSE_STALLED);
+    CHECK_INT(pal_mem_code(fast.peer), 0);
+    mem_end(&fast), mem_end(&deaf), mem_end(&direct);
+    end_relay();
+}
+
+static void nothing_that_a_viewer_says_goes_up(void)
+{
+    static const struct {
+        const char *text, *code;
+    } message[] = {{"{\"type\":\"command\",\"verb\":\"pause\"}", "role"},
+                   {"{\"type\":\"take_tool\",\"tool\":0}", "role"},
+                   {"{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}", "field"},
+                   {"{\"type\":\"join\",\"name\":\"again\",\"role\":\"viewer\",\"tool\":-1}", "joined"}};
+    mem_client direct, v;
+    const double at_m[3] = {0, 0, 0};
+    begin(false, (pal_relay_options){.max_viewers = 4});
+    mem_join(&direct, transport, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    mem_join(&v, down, "Mallory", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_ANY);
+    turn(FRAME_NS, &direct, &v, NULL);
+    CHECK_INT(v.last[PAL_CONTROL_HELLO].hello.you_role, PAL_WIRE_ROLE_VIEWER);
+    CHECK_TEXT(v.last[PAL_CONTROL_ERROR].error.code, "role");
+    for (size_t i = 0; i < sizeof message / sizeof *message; i++) {
+        mem_text(&v, message[i].text);
+        mem_pull(&v, 1000);
+        CHECK_INT(v.n_text[PAL_CONTROL_ERROR], (int)i + 2);
+        CHECK_TEXT(v.last[PAL_CONTROL_ERROR].error.code, message[i].code);
+    }
+    mem_pose(&v, 0, 1, at_m), mem_pose(&v, 0, 2, at_m);
+    mem_pull(&v, 1000);
+    CHECK_INT(v.n_text[PAL_CONTROL_ERROR], 6);
+    mem_text(&v, "{\"type\":\"ping\",\"stamp_ms\":7}");
+    mem_pull(&v, 1000);
+    CHECK(v.last[PAL_CONTROL_PONG].stamp_ms == 7);
+    turn(1000000000u, &direct, &v, NULL);
+    turn(1, &direct, &v, NULL);
+    CHECK(!direct.last[PAL_CONTROL_STATUS].status.paused);
+    CHECK_INT(direct.n_text[PAL_CONTROL_ORDERS], 0);
+    CHECK_INT(direct.tools.tool[0].flags & PAL_WIRE_TOOL_HELD, 0);
+    /* malformed, and too many */
+    mem_text(&v, "{\"type\":");
+    CHECK_INT(pal_mem_code(v.peer), PAL_WIRE_CLOSE_PROTOCOL);
+    mem_client flood;
+    mem_join(&flood, down, "flood", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    int n = 1;
+    for (; n < 100 && !pal_mem_code(flood.peer); n++) {
+        mem_text(&flood, "{\"type\":\"release_tool\"}");
+        mem_pull(&flood, 1000);
+    }
+    CHECK_INT(pal_mem_code(flood.peer), PAL_WIRE_CLOSE_RATE);
+    CHECK_INT(n, PAL_RELAY_CONTROL_AT_ONCE + 1);
+    mem_end(&v), mem_end(&flood), mem_end(&direct);
+    end_relay();
+}
+
+/* places, joining in time, and what is not there yet */
+static void places_are_limited_and_nobody_comes_before_the_session(void)
+{
+    static mem_client silent[PAL_RELAY_UNJOINED + 1];
+    mem_client a[3];
+    asset_late = true;
+    begin(true, (pal_relay_options){.max_viewers = 2});
+    mem_connect(&a[0], down, "", "");
+    CHECK_INT(pal_mem_code(a[0].peer), PAL_WIRE_CLOSE_GOING_AWAY); /* its assets are not here */
+    mem_end(&a[0]);
+    asset_late = false;
+    pal_relay_want_missing(&kept);
+    for (int i = 0; i < 3; i++) mem_join(&a[i], down, "v", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    for (int i = 0; i < 3; i++) CHECK_INT(pal_mem_code(a[i].peer), i < 2 ? 0 : PAL_WIRE_CLOSE_FULL);
+    mem_end(&a[2]);
+    for (int i = 0; i <= PAL_RELAY_UNJOINED; i++) {
+        mem_connect(&silent[i], down, "", "");
+        if (i == 0) turn(FRAME_NS, NULL, &a[0], &a[1]);
+    }
+    CHECK_INT(pal_mem_code(silent[0].peer), PAL_WIRE_CLOSE_FULL);
+    for (int i = 1; i <= PAL_RELAY_UNJOINED; i++) CHECK_INT(pal_mem_code(silent[i].peer), 0);
+    for (int i = 0; i < 330; i++) turn(FRAME_NS, NULL, &a[0], &a[1]); /* 5.5 s */
+    CHECK_INT(pal_mem_code(silent[1].peer), PAL_WIRE_CLOSE_POLICY);
+    CHECK_INT(pal_mem_code(a[0].peer) + pal_mem_code(a[1].peer), 0);
+    mem_end(&a[0]), mem_end(&a[1]);
+    for (int i = 0; i <= PAL_RELAY_UNJOINED; i++) mem_end(&silent[i]);
+    end_relay();
+}
+
+/* the line to the server breaks: viewers stay and go on with the same run, and leave with another */
+static void viewers_outlive_a_lost_line_but_not_the_run(void)
+{
+    mem_client direct, v;
+    begin(false, (pal_relay_options){.max_viewers = 2});
+    mem_join(&direct, transport, "Tim", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
+    mem_join(&v, down, "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    for (int i = 0; i < 30; i++) turn(FRAME_NS, &direct, &v, NULL);
+    pal_mem_leave(up);
+    pal_relay_lost(&kept);
+    for (int i = 0; i < 30; i++) {
+        served_turn(FRAME_NS, &direct, NULL);
+        pal_loop_advance(loop);
+        mem_pull(&v, 1000);
+    }
+    CHECK_INT(pal_mem_code(v.peer), 0);
+    connect_up();
+    for (int i = 0; i < 30; i++) turn(FRAME_NS, &direct, &v, NULL);
+    CHECK_INT(pal_mem_code(v.peer), 0);
+    CHECK_INT(v.n_bad, 0);
+    CHECK_INT(v.n_text[PAL_CONTROL_HELLO], 1);
+    same_shape(&v, &direct);
+    /* a server that began at another time */
+    static pal_control other;
+    static char text[PAL_CONTROL_OUT_MAX + 1];
+    size_t n = 0;
+    other = (pal_control){.type = PAL_CONTROL_HELLO, .hello = v.last[PAL_CONTROL_HELLO].hello};
+    other.hello.started++;
+    CHECK_INT(pal_control_put(text, sizeof text, &other, &n), 0);
+    pal_relay_take_text(&kept, &other, text, n);
+    served_turn(400000000u, &direct, NULL);
+    pal_loop_advance(loop);
+    CHECK_INT(pal_mem_code(v.peer), PAL_WIRE_CLOSE_GOING_AWAY);
+    CHECK_TEXT(pal_mem_reason(v.peer), "the session begins anew");
+    mem_end(&v), mem_end(&direct);
+    end_relay();
+}
+
+static void what_is_not_what_its_name_says_is_refused(void)
+{
+    static const uint8_t bytes[] = {1, 2, 3};
+    begin(true, (pal_relay_options){.max_viewers = 2});
+    CHECK_INT(pal_relay_take_asset(&kept, "/asset/00112233445566778899aabbccddeeff", bytes, sizeof bytes),
+              PAL_ERR_REFUSED);
+    end_relay();
+}
+
+int main(void)
+{
+    if (!small_scene_make(&organ, "small")) return 1;
+    RUN(viewers_see_what_the_server_sends);
+    RUN(a_newcomer_gets_a_key_frame_of_a_part_at_rest);
+    RUN(a_slow_viewer_costs_the_others_nothing);
+    RUN(nothing_that_a_viewer_says_goes_up);
+    RUN(places_are_limited_and_nobody_comes_before_the_session);
+    RUN(viewers_outlive_a_lost_line_but_not_the_run);
+    RUN(what_is_not_what_its_name_says_is_refused);
+    pal_prepared_free(&organ.mesh);
+    return check_report();
+}
