@@ -95,6 +95,7 @@ int main(int argc, char **argv)
 {
     static relay r; /* too large for the stack */
     const char *upstream[1], *page = NULL;
+    double seconds = 0;
     pal_flag_common common;
     pal_diagnostic diag = {""};
     r.address = (pal_listen_address){.ip = "127.0.0.1", .port = 8092};
@@ -110,6 +111,7 @@ int main(int argc, char **argv)
         {"--tls-key", "FILE", PAL_FLAG_TEXT, &r.address.tls_key, 0, 0, "key of that certificate, in PEM"},
         {"--keys", "FILE", PAL_FLAG_TEXT, &r.options.keys, 0, 0, "check tickets with this key file (they are not)"},
         {"--viewer", "FOLDER", PAL_FLAG_TEXT, &page, 0, 0, "files of the page (none)"},
+        {"--seconds", "S", PAL_FLAG_NUMBER, &seconds, 0.1, 1e9, "end after so long (a signal ends it)"},
         {"--max-viewers", "N", PAL_FLAG_COUNT, &r.options.max_viewers, 1, 10000, "viewers at once (1000)"},
     };
     const pal_flag_table table = {
@@ -117,6 +119,7 @@ int main(int argc, char **argv)
         .usage = "UPSTREAM [flags]",
         .about = "Shows a session of a server, or of another relay, to many viewers: one connection up, many down.\n"
                  "UPSTREAM is the address that the server prints, as http://127.0.0.1:8090/?session=NAME.\n",
+        .example = "palpate relay http://127.0.0.1:8090/ --port 0 --seconds 1\n",
         PAL_FLAGS(flag),
         .operands = {1, 1}};
     const int usage = pal_flags_parse(&table, argc, argv, &common, upstream, NULL);
@@ -127,7 +130,7 @@ int main(int argc, char **argv)
     int code = 0;
     if (!err) {
         announce(&r, &common);
-        pal_link_run(r.up);
+        pal_link_run_for(r.up, seconds);
         pal_loop_stop(r.loop);
         pthread_join(r.net, NULL);
         code = pal_relay_upstream_ended(r.upstream, &reason);

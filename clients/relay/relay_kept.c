@@ -1,5 +1,6 @@
 #include "clients/relay/relay_kept.h"
 
+#include "clients/relay/tuning.h"
 #include "protocol/asset.h"
 #include "protocol/frame_codec.h"
 #include "server/base/log.h"
@@ -77,23 +78,38 @@ static bool names(const pal_relay_names *n, const char *path)
     return false;
 }
 
+static bool is_named(const pal_relay_kept *k, const char *path)
+{
+    return names(&k->names[PAL_RELAY_HELLO], path) || names(&k->names[PAL_RELAY_TOPOLOGY], path) ||
+           names(&k->before, path);
+}
+
 static void forget_assets(pal_relay_kept *k)
 {
     for (pal_relay_asset **at = &k->asset, *a; (a = *at);) {
-        if (names(&k->names[PAL_RELAY_HELLO], a->path) || names(&k->names[PAL_RELAY_TOPOLOGY], a->path) ||
-            names(&k->before, a->path)) {
+        if (is_named(k, a->path)) {
             at = &a->next;
             continue;
         }
         *at = a->next;
+        k->asset_bytes -= a->bytes->n_byte;
         pal_packet_drop(a->bytes);
         free(a);
     }
 }
 
+/* upstream names nothing but assets: what has another path is neither fetched nor shown */
+static bool is_asset_path(const char *path)
+{
+    static const char folder[] = "/asset/";
+    const char *hash = path + sizeof folder - 1;
+    return !strncmp(path, folder, sizeof folder - 1) && strspn(hash, "0123456789abcdef") == PAL_ASSET_HASH_CHARS - 1 &&
+           strlen(hash) == PAL_ASSET_HASH_CHARS - 1;
+}
+
 static void add_name(pal_relay_names *n, const char *path)
 {
-    if (!path[0] || names(n, path)) return;
+    if (!is_asset_path(path) || names(n, path)) return;
     snprintf(n->path[n->n_path++], sizeof *n->path, "%s", path);
 }
 
@@ -111,6 +127,15 @@ static void read_names(pal_relay_names *n, const pal_wire_part_info *part, uint3
 
 /* ---- hello and topology ---- */
 
+/* a frame of an older epoch is no key frame any more */
+static void show_epochs(pal_relay_kept *k, const pal_relay_names *n)
+{
+    for (uint32_t p = 0; p < n->n_part; p++) {
+        if (n->epoch[p] != k->epoch[p]) keep(k, &k->frame[p], NULL);
+        k->epoch[p] = n->epoch[p];
+    }
+}
+
 /* shows what is announced and complete: hello before topology */
 static void show(pal_relay_kept *k)
 {
@@ -121,7 +146,7 @@ static void show(pal_relay_kept *k)
         if (!complete) continue;
         keep(k, &k->text[i], k->announced[i]);
         k->announced[i] = NULL;
-        memcpy(k->epoch, n->epoch, sizeof *k->epoch * n->n_part);
+        show_epochs(k, n);
         show_frames(k);
         /* a session that is paused may send no cycle soon */
         if (k->tools.packet) k->tools.number = ++k->number;
@@ -149,6 +174,7 @@ static void take_hello(pal_relay_kept *k, const pal_wire_hello *h, pal_packet *p
     k->up = true;
     pal_packet_replace(&k->announced[PAL_RELAY_HELLO], packet);
     read_names(&k->names[PAL_RELAY_HELLO], h->part, h->n_part);
+    forget_assets(k);
 }
 
 static void take_topology(pal_relay_kept *k, const pal_wire_topology *t, pal_packet *packet)
@@ -156,6 +182,7 @@ static void take_topology(pal_relay_kept *k, const pal_wire_topology *t, pal_pac
     if (!k->announced[PAL_RELAY_TOPOLOGY]) k->before = k->names[PAL_RELAY_TOPOLOGY];
     pal_packet_replace(&k->announced[PAL_RELAY_TOPOLOGY], packet);
     read_names(&k->names[PAL_RELAY_TOPOLOGY], t->part, t->n_part);
+    forget_assets(k); /* of one that was never complete */
 }
 
 /* ---- from upstream ---- */
@@ -215,7 +242,10 @@ pal_err pal_relay_take_asset(pal_relay_kept *k, const char *path, const uint8_t 
     char hash[PAL_ASSET_HASH_CHARS];
     const char *slash = strrchr(path, '/');
     pal_asset_hash(bytes, n_byte, hash);
-    if (!slash || strcmp(slash + 1, hash)) return PAL_ERR_REFUSED;
+    /* [up] alone changes names and assets */
+    if (!slash || strcmp(slash + 1, hash) || !is_named(k, path)) return PAL_ERR_REFUSED;
+    if (find(k, path)) return PAL_ERR_OK;
+    if (n_byte > PAL_RELAY_ASSETS_BYTES - k->asset_bytes) return PAL_ERR_FULL;
     pal_relay_asset *a = calloc(1, sizeof *a);
     pal_packet *packet = pal_packet_create(bytes, n_byte, false);
     if (!a || !packet) {
@@ -228,6 +258,7 @@ pal_err pal_relay_take_asset(pal_relay_kept *k, const char *path, const uint8_t 
     pthread_mutex_lock(&k->lock);
     a->next = k->asset;
     k->asset = a;
+    k->asset_bytes += n_byte;
     show(k);
     pthread_mutex_unlock(&k->lock);
     k->changed(k->changed_user);

@@ -55,6 +55,7 @@ typedef struct pal_relay_kept {
     pal_packet *order[PAL_RELAY_ORDERS]; /* ring buffer */
     uint64_t n_order;
     pal_relay_asset *asset; /* list */
+    size_t asset_bytes;     /* of them all */
     /* [up] */
     uint32_t started, epoch[PAL_WIRE_PART_MAX]; /* of the run; of what is shown */
     pal_packet *coming[PAL_WIRE_PART_MAX];      /* newest FRAME of a cycle that is open, or of an epoch to come */
@@ -78,7 +79,7 @@ void pal_relay_kept_free(pal_relay_kept *kept); /* [load] */
 void pal_relay_take_text(pal_relay_kept *kept, const pal_control *decoded, const char *text, size_t n_byte);
 /* a binary message of upstream with a valid head; FRAME and TOOLS are kept. [up] */
 void pal_relay_take_message(pal_relay_kept *kept, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte);
-/* REFUSED: its hash is not the name in its path; MEMORY. [up] */
+/* REFUSED: its hash is not the name in its path, or nothing names it now; FULL: too much is kept; MEMORY. [up] */
 pal_err pal_relay_take_asset(pal_relay_kept *kept, const char *path, const uint8_t *bytes, size_t n_byte);
 void pal_relay_want_missing(pal_relay_kept *kept); /* asks once more for every asset that is missing. [up] */
 void pal_relay_lost(pal_relay_kept *kept);         /* upstream does not answer. [up] */

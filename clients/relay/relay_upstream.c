@@ -2,6 +2,7 @@
 
 #include "clients/relay/tuning.h"
 #include "protocol/asset.h"
+#include "server/base/clock.h"
 #include "server/base/log.h"
 
 #include <stdio.h>
@@ -19,6 +20,7 @@ struct pal_relay_upstream {
     pal_link_loop *loop;
     pal_link *link;
     pal_relay_kept *kept;
+    uint64_t heard_ns; /* when it said something last */
     char url[512];
     fetch *fetches;
     int end_code;
@@ -58,27 +60,29 @@ static void want(void *user, const char *path)
     }
 }
 
-static void fetch_missing(void *user)
+static void end(pal_relay_upstream *u, int code, const char *reason)
 {
-    pal_relay_want_missing(((pal_relay_upstream *)user)->kept);
+    u->end_code = code;
+    snprintf(u->end_reason, sizeof u->end_reason, "%s", reason);
+    pal_link_stop(u->loop);
 }
 
 static void state(void *user, pal_link_state now, int code, const char *reason)
 {
     pal_relay_upstream *u = user;
+    u->heard_ns = pal_clock_ns();
     if (now == PAL_LINK_JOINED) pal_log(PAL_LOG_INFO, "upstream", "%s is relayed", u->kept->session);
     if (now != PAL_LINK_LOST && now != PAL_LINK_ENDED) return;
     pal_log(PAL_LOG_WARN, "upstream", "lost: %s", reason[0] ? reason : "no connection");
     pal_relay_lost(u->kept);
-    if (now == PAL_LINK_LOST) return;
-    u->end_code = code ? code : PAL_WIRE_CLOSE_GOING_AWAY;
-    snprintf(u->end_reason, sizeof u->end_reason, "%s", reason);
-    pal_link_stop(u->loop);
+    if (now == PAL_LINK_ENDED) end(u, code ? code : PAL_WIRE_CLOSE_GOING_AWAY, reason);
 }
 
 static void text(void *user, const pal_control *decoded, const char *bytes, size_t n_byte)
 {
-    pal_relay_take_text(((pal_relay_upstream *)user)->kept, decoded, bytes, n_byte);
+    pal_relay_upstream *u = user;
+    u->heard_ns = pal_clock_ns();
+    pal_relay_take_text(u->kept, decoded, bytes, n_byte);
 }
 
 static void message(void *user, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
@@ -88,23 +92,48 @@ static void message(void *user, const pal_wire_head *head, const uint8_t *bytes,
     if (head->kind == PAL_WIRE_TOOLS) pal_link_acknowledge(u->link, bytes, n_byte);
 }
 
-pal_err pal_relay_upstream_open(pal_link_loop *loop, const char *url, pal_relay_kept *kept, pal_diagnostic *diag,
-                                pal_relay_upstream **out)
+static pal_err connect_up(pal_relay_upstream *u, pal_diagnostic *diag)
 {
     static const pal_link_events events = {.state = state, .text = text, .message = message};
-    pal_relay_upstream *u = calloc(1, sizeof *u);
-    if (!u) return PAL_ERR_MEMORY;
-    *u = (pal_relay_upstream){.loop = loop, .kept = kept};
-    snprintf(u->url, sizeof u->url, "%s", url);
-    pal_relay_kept_fetch_by(kept, want, u);
-    const pal_link_options options = {.url = url,
+    const pal_link_options options = {.url = u->url,
                                       .name = "relay",
                                       .role = PAL_WIRE_ROLE_VIEWER,
                                       .tool = PAL_WIRE_TOOL_NONE,
                                       .events = &events,
                                       .user = u};
-    pal_err err = pal_link_open(loop, &options, diag, &u->link);
-    if (!err && !pal_link_add_timer(loop, PAL_RELAY_FETCH_US, fetch_missing, u)) err = PAL_ERR_MEMORY;
+    u->heard_ns = pal_clock_ns();
+    return pal_link_open(u->loop, &options, diag, &u->link);
+}
+
+/* a machine that is gone closes no connection */
+static void call_again(pal_relay_upstream *u)
+{
+    const pal_link_state now = pal_link_current_state(u->link);
+    if (now != PAL_LINK_OPEN && now != PAL_LINK_JOINED) return;
+    if (pal_clock_ns() - u->heard_ns < PAL_RELAY_SILENT_NS) return;
+    pal_log(PAL_LOG_WARN, "upstream", "silent: it is called again");
+    pal_relay_lost(u->kept);
+    pal_link_close(u->link);
+    if (connect_up(u, NULL)) end(u, PAL_WIRE_CLOSE_INTERNAL, pal_err_text(PAL_ERR_MEMORY));
+}
+
+static void look_after(void *user)
+{
+    pal_relay_upstream *u = user;
+    call_again(u);
+    pal_relay_want_missing(u->kept);
+}
+
+pal_err pal_relay_upstream_open(pal_link_loop *loop, const char *url, pal_relay_kept *kept, pal_diagnostic *diag,
+                                pal_relay_upstream **out)
+{
+    pal_relay_upstream *u = calloc(1, sizeof *u);
+    if (!u) return PAL_ERR_MEMORY;
+    *u = (pal_relay_upstream){.loop = loop, .kept = kept};
+    snprintf(u->url, sizeof u->url, "%s", url);
+    pal_relay_kept_fetch_by(kept, want, u);
+    pal_err err = connect_up(u, diag);
+    if (!err && !pal_link_add_timer(loop, PAL_RELAY_LOOK_US, look_after, u)) err = PAL_ERR_MEMORY;
     if (err) return pal_relay_upstream_close(u), err;
     *out = u;
     return PAL_ERR_OK;

@@ -3,6 +3,7 @@
 #include "clients/relay/tuning.h"
 #include "server/base/log.h"
 #include "server/net/transport/credit.h"
+#include "server/net/transport/host_name.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,8 +17,8 @@ typedef struct viewer {
     pal_relay_viewers *of;
     pal_peer *peer;
     bool joined;
-    uint32_t run; /* of what it knows */
-    uint64_t opened_ns;
+    uint32_t run;                 /* of what it knows */
+    uint64_t opened_ns, waits_ns; /* waits_ns: since when something waits to be taken; 0: nothing */
     pal_grant grant;
     pal_bucket acks, orders;
     pal_credit credit;
@@ -79,22 +80,26 @@ static void leave(viewer *v)
     *v = (viewer){.peer = NULL};
 }
 
-/* a place for one that has not joined: of too many such, the oldest loses its own */
-static viewer *take_place(pal_relay_viewers *all)
+/* a place for one that has not joined: of too many such, the oldest loses its own, of the same address first */
+static viewer *take_place(pal_relay_viewers *all, const char *address)
 {
-    viewer *place = NULL, *oldest = NULL;
-    int n = 0;
+    viewer *place = NULL, *oldest = NULL, *oldest_here = NULL;
+    int n = 0, n_here = 0;
     for (viewer *v = all->place; v < all->place + all->n_place; v++) {
         if (!v->peer && !place) place = v;
         if (!v->peer || v->joined) continue;
-        n++;
+        const bool here = !strcmp(v->peer->address, address);
+        n++, n_here += here;
         if (!oldest || v->opened_ns < oldest->opened_ns) oldest = v;
+        if (here && (!oldest_here || v->opened_ns < oldest_here->opened_ns)) oldest_here = v;
     }
-    if (n < PAL_RELAY_UNJOINED) return place;
+    if (n_here < PAL_RELAY_UNJOINED_OF_ADDRESS) oldest_here = NULL;
+    viewer *evicted = oldest_here ? oldest_here : n < PAL_RELAY_UNJOINED ? NULL : oldest;
+    if (!evicted) return place;
     all->count.n_refused++;
-    pal_peer_drop(oldest->peer, PAL_WIRE_CLOSE_FULL, "too many connections that do not join");
-    leave(oldest);
-    return oldest;
+    pal_peer_drop(evicted->peer, PAL_WIRE_CLOSE_FULL, "too many connections that do not join");
+    leave(evicted);
+    return evicted;
 }
 
 static void opened(void *user, pal_peer *peer, const char *session, const char *ticket)
@@ -120,7 +125,7 @@ static void opened(void *user, pal_peer *peer, const char *session, const char *
     else if (all->admission && (why = pal_admission_check(all->admission, ticket, name, peer->address,
                                                           (uint64_t)time(NULL), now, &fresh.grant)))
         pal_peer_drop(peer, PAL_WIRE_CLOSE_POLICY, "%s", why);
-    viewer *v = peer->drop_code ? NULL : take_place(all);
+    viewer *v = peer->drop_code ? NULL : take_place(all, peer->address);
     if (!v) {
         all->count.n_refused++;
         return;
@@ -138,6 +143,19 @@ static void closed(void *user, pal_peer *peer)
     if (peer->client) leave(peer->client);
 }
 
+static bool has_place(const viewer *v)
+{
+    const pal_relay_viewers *all = v->of;
+    const pal_ticket *ticket = &v->grant.ticket;
+    int n = 0, max_here = all->max_viewers / PAL_RELAY_ADDRESSES;
+    if (all->count.n_viewer >= all->max_viewers) return false;
+    if (pal_address_is_loopback(v->peer->address) || ticket->uses || ticket->user) return true;
+    for (const viewer *other = all->place; other < all->place + all->n_place; other++)
+        n += other->peer && other->joined && !strcmp(other->peer->address, v->peer->address);
+    if (max_here < PAL_RELAY_ADDRESS_PLACES) max_here = PAL_RELAY_ADDRESS_PLACES;
+    return n < max_here;
+}
+
 static void join(viewer *v, const pal_wire_join *wanted)
 {
     pal_relay_viewers *all = v->of;
@@ -145,7 +163,7 @@ static void join(viewer *v, const pal_wire_join *wanted)
         refuse(v, "joined", "you have joined already");
         return;
     }
-    const bool full = all->count.n_viewer >= all->max_viewers;
+    const bool full = !has_place(v);
     if (full || (all->admission && pal_admission_enter(all->admission, &v->grant, pal_loop_now_ns(all->loop)))) {
         all->count.n_refused++;
         pal_peer_drop(v->peer, PAL_WIRE_CLOSE_FULL, "%s",
@@ -318,6 +336,7 @@ static pal_packet *next(void *user, pal_peer *peer)
     pthread_mutex_lock(&all->kept->lock);
     pal_packet *packet = v->run == all->kept->run ? take_next(v) : NULL;
     pthread_mutex_unlock(&all->kept->lock);
+    v->waits_ns = 0;
     if (packet) all->count.n_byte += packet->n_byte;
     return packet;
 }
@@ -334,8 +353,10 @@ static void wake(void *user)
         if (!v->peer || v->peer->drop_code) continue;
         if (v->run != run)
             pal_peer_drop(v->peer, PAL_WIRE_CLOSE_GOING_AWAY, "the session begins anew");
-        else if (waiting(all, v->peer))
+        else if (waiting(all, v->peer)) {
+            if (!v->waits_ns) v->waits_ns = pal_loop_now_ns(all->loop);
             v->peer->ops->ready(v->peer);
+        }
     }
 }
 
@@ -350,6 +371,8 @@ static void tick(void *user)
             pal_peer_drop(v->peer, PAL_WIRE_CLOSE_POLICY, "no join within 5 s");
         else if (pal_credit_stalled(&v->credit, now, PAL_RELAY_STALL_NS))
             pal_peer_drop(v->peer, PAL_WIRE_CLOSE_STALLED, "no acknowledgement for 10 s");
+        else if (v->waits_ns && now - v->waits_ns > PAL_RELAY_STALL_NS)
+            pal_peer_drop(v->peer, PAL_WIRE_CLOSE_STALLED, "nothing is read for 10 s");
     }
 }
 

@@ -683,7 +683,7 @@ int main(void)
     begin((pal_server_options){.source = &source});
     RUN(sessions_are_opened_by_json_of_the_own_site);
     end();
-    begin((pal_server_options){.max_clients = 100, .max_viewers = 100, .health = "0"});
+    begin((pal_server_options){.max_clients = 100, .max_viewers = 1, .health = "0"});
     RUN(health_answers_when_every_socket_is_held);
     end();
     for (size_t i = 0; i < 5; i++) {

@@ -173,6 +173,50 @@ static void a_slow_viewer_costs_the_others_nothing(void)
     end_relay();
 }
 
+/* one that takes nothing, so that it has nothing to acknowledge, may not hold old messages for ever */
+static void a_viewer_that_reads_nothing_is_closed(void)
+{
+    mem_client reads, deaf;
+    begin(false, (pal_relay_options){.max_viewers = 4});
+    mem_join(&reads, down, "reads", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&deaf, down, "deaf", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    for (int i = 0; i < 600; i++) turn(FRAME_NS, NULL, &reads, NULL); /* 10 s */
+    CHECK_INT(pal_mem_code(deaf.peer), 0);
+    for (int i = 0; i < 60; i++) turn(FRAME_NS, NULL, &reads, NULL);
+    CHECK_INT(pal_mem_code(deaf.peer), PAL_WIRE_CLOSE_STALLED);
+    CHECK_INT(pal_mem_code(reads.peer), 0);
+    mem_end(&reads), mem_end(&deaf);
+    end_relay();
+}
+
+/* one address of another machine neither takes all places nor turns away those of others who are about to join */
+static void one_address_keeps_no_others_out(void)
+{
+    static mem_client crowd[60], silent[PAL_RELAY_UNJOINED_OF_ADDRESS + 1];
+    mem_client other;
+    int joined = 0;
+    begin(true, (pal_relay_options){.max_viewers = 200});
+    for (int i = 0; i < 60; i++) {
+        mem_connect(&crowd[i], down, "192.0.2.1", "");
+        mem_enter(&crowd[i], "crowd", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE, false);
+        const bool in = pal_mem_code(crowd[i].peer) == 0;
+        joined += in;
+        if (!in) mem_end(&crowd[i]);
+    }
+    CHECK_INT(joined, 200 / PAL_RELAY_ADDRESSES);
+    mem_connect(&other, down, "192.0.2.2", "");
+    for (int i = 0; i <= PAL_RELAY_UNJOINED_OF_ADDRESS; i++) mem_connect(&silent[i], down, "192.0.2.1", "");
+    CHECK_INT(pal_mem_code(silent[0].peer), PAL_WIRE_CLOSE_FULL);
+    CHECK_INT(pal_mem_code(silent[1].peer), 0);
+    mem_enter(&other, "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE, false);
+    CHECK_INT(pal_mem_code(other.peer), 0);
+    for (int i = 0; i < 60; i++)
+        if (crowd[i].peer) mem_end(&crowd[i]);
+    for (int i = 0; i <= PAL_RELAY_UNJOINED_OF_ADDRESS; i++) mem_end(&silent[i]);
+    mem_end(&other);
+    end_relay();
+}
+
 static void nothing_that_a_viewer_says_goes_up(void)
 {
     static const struct {
@@ -238,7 +282,9 @@ static void places_are_limited_and_nobody_comes_before_the_session(void)
     for (int i = 0; i < 3; i++) CHECK_INT(pal_mem_code(a[i].peer), i < 2 ? 0 : PAL_WIRE_CLOSE_FULL);
     mem_end(&a[2]);
     for (int i = 0; i <= PAL_RELAY_UNJOINED; i++) {
-        mem_connect(&silent[i], down, "", "");
+        char address[24];
+        snprintf(address, sizeof address, "192.0.2.%d", i);
+        mem_connect(&silent[i], down, address, "");
         if (i == 0) turn(FRAME_NS, NULL, &a[0], &a[1]);
     }
     CHECK_INT(pal_mem_code(silent[0].peer), PAL_WIRE_CLOSE_FULL);
@@ -289,12 +335,84 @@ static void viewers_outlive_a_lost_line_but_not_the_run(void)
     end_relay();
 }
 
-static void what_is_not_what_its_name_says_is_refused(void)
+static void path_of(const char *folder, const uint8_t *bytes, size_t n_byte, char path[PAL_WIRE_NAME_BYTES])
 {
-    static const uint8_t bytes[] = {1, 2, 3};
+    char hash[PAL_ASSET_HASH_CHARS];
+    pal_asset_hash(bytes, n_byte, hash);
+    snprintf(path, PAL_WIRE_NAME_BYTES, "%s%s", folder, hash);
+}
+
+/* upstream says that part 0 has another asset, and perhaps an interior */
+static void announce(uint32_t epoch, const char *asset, const char *interior)
+{
+    static pal_control message;
+    static char text[PAL_CONTROL_OUT_MAX + 1];
+    size_t n = 0;
+    message = (pal_control){.type = PAL_CONTROL_TOPOLOGY};
+    message.topology.n_part = 1;
+    message.topology.part[0] = (pal_wire_part_info){.name = "organ", .epoch = epoch, .n_vertex = 4, .error_m = 1e-4};
+    snprintf(message.topology.part[0].asset, PAL_WIRE_NAME_BYTES, "%s", asset);
+    snprintf(message.topology.part[0].interior, PAL_WIRE_NAME_BYTES, "%s", interior);
+    CHECK_INT(pal_control_put(text, sizeof text, &message, &n), 0);
+    pal_relay_take_text(&kept, &message, text, n);
+}
+
+static size_t kept_assets(void)
+{
+    size_t n = 0;
+    for (const pal_relay_asset *a = kept.asset; a; a = a->next) n++;
+    return n;
+}
+
+static void what_upstream_offers_and_nothing_names_is_refused(void)
+{
+    static const uint8_t bytes[] = {1, 2, 3}, others[] = {4, 5, 6};
+    char path[PAL_WIRE_NAME_BYTES], other[PAL_WIRE_NAME_BYTES], elsewhere[PAL_WIRE_NAME_BYTES];
+    path_of("/asset/", bytes, sizeof bytes, path);
+    path_of("/asset/", others, sizeof others, other);
+    path_of("/sessions/", bytes, sizeof bytes, elsewhere);
     begin(true, (pal_relay_options){.max_viewers = 2});
-    CHECK_INT(pal_relay_take_asset(&kept, "/asset/00112233445566778899aabbccddeeff", bytes, sizeof bytes),
-              PAL_ERR_REFUSED);
+    CHECK_INT(pal_relay_take_asset(&kept, path, bytes, sizeof bytes), PAL_ERR_REFUSED); /* nothing names it */
+    asset_late = true;
+    announce(2, path, elsewhere);
+    CHECK_INT(pal_relay_take_asset(&kept, path, others, sizeof others), PAL_ERR_REFUSED); /* another hash */
+    CHECK_INT(pal_relay_take_asset(&kept, elsewhere, bytes, sizeof bytes), PAL_ERR_REFUSED);
+    CHECK_INT(pal_relay_take_asset(&kept, path, bytes, sizeof bytes), PAL_ERR_OK);
+    CHECK_INT(pal_relay_take_asset(&kept, path, bytes, sizeof bytes), PAL_ERR_OK); /* twice is once */
+    /* as much as a session may have is kept already */
+    announce(3, other, "");
+    const size_t held = kept.asset_bytes;
+    kept.asset_bytes = PAL_RELAY_ASSETS_BYTES - 2;
+    CHECK_INT(pal_relay_take_asset(&kept, other, others, sizeof others), PAL_ERR_FULL);
+    kept.asset_bytes = held;
+    CHECK_INT(pal_relay_take_asset(&kept, other, others, sizeof others), PAL_ERR_OK);
+    asset_late = false;
+    end_relay();
+}
+
+/* a part that is edited again and again, and never complete, leaves nothing behind; nor does its old frame */
+static void edits_leave_no_assets_and_frames_behind(void)
+{
+    uint8_t bytes[4] = {0};
+    char path[PAL_WIRE_NAME_BYTES];
+    begin(true, (pal_relay_options){.max_viewers = 2});
+    for (int i = 0; i < 10 && !kept.frame[0].packet; i++) turn(FRAME_NS, NULL, NULL, NULL);
+    const size_t before = kept_assets();
+    CHECK(kept.frame[0].packet != NULL);
+    asset_late = true;
+    for (uint8_t i = 0; i < 20; i++) {
+        bytes[0] = i;
+        path_of("/asset/", bytes, sizeof bytes, path);
+        announce(2 + i, path, "/asset/00112233445566778899aabbccddeeff");
+        CHECK_INT(pal_relay_take_asset(&kept, path, bytes, sizeof bytes), PAL_ERR_OK);
+        CHECK_INT(kept_assets(), before + 1);
+    }
+    CHECK(kept.frame[0].packet != NULL); /* what is shown is still of the first epoch */
+    announce(40, path, "");
+    CHECK_INT(kept_assets(), before + 1);
+    CHECK_INT(kept.epoch[0], 40);
+    CHECK(kept.frame[0].packet == NULL);
+    asset_late = false;
     end_relay();
 }
 
@@ -304,10 +422,13 @@ int main(void)
     RUN(viewers_see_what_the_server_sends);
     RUN(a_newcomer_gets_a_key_frame_of_a_part_at_rest);
     RUN(a_slow_viewer_costs_the_others_nothing);
+    RUN(a_viewer_that_reads_nothing_is_closed);
+    RUN(one_address_keeps_no_others_out);
     RUN(nothing_that_a_viewer_says_goes_up);
     RUN(places_are_limited_and_nobody_comes_before_the_session);
     RUN(viewers_outlive_a_lost_line_but_not_the_run);
-    RUN(what_is_not_what_its_name_says_is_refused);
+    RUN(what_upstream_offers_and_nothing_names_is_refused);
+    RUN(edits_leave_no_assets_and_frames_behind);
     pal_prepared_free(&organ.mesh);
     return check_report();
 }

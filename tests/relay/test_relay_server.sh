@@ -23,6 +23,14 @@ viewers() {
         };
         look();' "http${1#ws}" "$2"
 }
+# ready RELAY STATUS: until /readyz answers so, for a minute at most
+ready() {
+    timeout 60 node -e 'const [url, status] = process.argv.slice(1);
+        const look = async () => {
+            if ((await fetch(new URL("/readyz", url))).status !== Number(status)) setTimeout(look, 20);
+        };
+        look();' "http${1#ws}" "$2"
+}
 client() { # NAME URL flags: report in $work/NAME, exit code in $code
     name=$1 to=$2
     shift 2
@@ -57,6 +65,23 @@ client second "$relay" --script idle --tool none --until frames=20,cycles=20
 check "a viewer of a relay of a relay passes every check" $code == 0
 stop $relay_job
 check "a relay ends on SIGTERM with 0" $? == 0
+
+# a server that stands still closes no connection: the relay says so, and its viewer stays and sees more when it goes on
+timeout 100 "$bin/palpate-client" "$relay_one" --json --script idle --tool none --seconds 60 >"$work/patient" 2>"$work/patient.err" &
+patient=$!
+pids="$pids $patient"
+viewers "$relay_one" 1
+kill -STOP "$server_pid"
+ready "$relay_one" 503
+check "a silent server is noticed" $? == 0
+kill -CONT "$server_pid"
+ready "$relay_one" 200
+check "and called again" $? == 0
+client after "$relay_one" --script idle --tool none --until frames=5,cycles=5
+check "its frames go on" $code == 0
+viewers "$relay_one" 1
+check "the viewer has stayed" $? == 0
+stop $patient
 
 # the server goes away and comes back on the same port as another run: the viewer joins again by itself
 timeout 100 "$bin/palpate-client" "$relay_one" --json --script idle --tool none --seconds 60 --until joins=2,cycles_of_it=5 >"$work/again" 2>"$work/again.err" &
