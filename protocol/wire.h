@@ -97,7 +97,7 @@ typedef struct pal_wire_pose {
     float torque_N_m[3];
     float grip;         /* opening, rad or m; 0 without a gripper                                 */
     uint32_t buttons;   /* PAL_WIRE_GRASP                                                           */
-    uint32_t model_seq; /* newest haptic model in use by the sender, 0 none                       */
+    uint32_t model_seq; /* newest haptic model that the sender's device renders, 0 none           */
     uint32_t model_age_us;
     uint64_t model_stamp_us; /* stamp_us of that model                                                 */
 } pal_wire_pose;

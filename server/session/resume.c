@@ -82,7 +82,7 @@ static int find_grasps(const pal_resume *resume, size_t n, uint64_t closed[PAL_T
     uint64_t since[PAL_TOOL_MAX] = {0};
     for (size_t at = PAL_INPUT_HEADER; at < n;) {
         if (get(resume, &at, &record, NULL)) break;
-        const bool pose = record.kind == PAL_INPUT_POSE, grasp = pose && (record.pose.buttons & 1);
+        const bool pose = record.kind == PAL_INPUT_POSE, grasp = pose && (record.pose.buttons & PAL_POSE_GRASP);
         if (pose || record.kind == PAL_INPUT_RELEASE) {
             if (grasp && !held[record.index]) since[record.index] = record.step;
             held[record.index] = grasp;

@@ -11,6 +11,7 @@
 #include "tests/net/mem_transport.h"
 
 typedef struct mem_client {
+    uint32_t model_seq; /* haptic model that its poses name */
     pal_transport *transport;
     pal_mem_peer *peer;
     pal_control last[PAL_CONTROL_COUNT]; /* newest of each type */
@@ -195,7 +196,11 @@ static inline int mem_pull(mem_client *c, int n)
 static inline void mem_pose(mem_client *c, int tool, uint32_t seq, const double position_m[3])
 {
     uint8_t bytes[PAL_WIRE_POSE_BYTES];
-    pal_wire_pose pose = {.tool = (uint16_t)tool, .seq = seq, .stamp_us = 1000 + seq, .quaternion = {1, 0, 0, 0}};
+    pal_wire_pose pose = {.tool = (uint16_t)tool,
+                          .seq = seq,
+                          .stamp_us = 1000 + seq,
+                          .quaternion = {1, 0, 0, 0},
+                          .model_seq = c->model_seq};
     for (int i = 0; i < 3; i++) pose.position_m[i] = position_m[i];
     CHECK_INT(pal_wire_put_pose(bytes, sizeof bytes, &pose), PAL_WIRE_POSE_BYTES);
     pal_mem_send(c->peer, bytes, sizeof bytes, false);

@@ -85,12 +85,39 @@ static void through_edits(void)
     replays_equal(6);
 }
 
+static size_t slurp(const char *name, uint8_t *bytes, size_t cap)
+{
+    FILE *file = fopen(name, "rb");
+    size_t n = file ? fread(bytes, 1, cap, file) : 0;
+    if (file) fclose(file);
+    return n;
+}
+
+/* a pose that names no haptic model is of a hand that feels nothing */
+static void says_who_feels(int unfelt_tool)
+{
+    static uint8_t bytes[1 << 20];
+    const size_t n = slurp(path, bytes, sizeof bytes);
+    size_t at = 0;
+    int n_pose[2] = {0, 0};
+    pal_input_header header;
+    pal_input_record r;
+    REQUIRE(!pal_input_get_header("log", bytes, n, &header, &at, NULL));
+    while (!pal_input_get_record("log", bytes, n, &at, &r, NULL)) {
+        if (r.kind != PAL_INPUT_POSE) continue;
+        n_pose[r.index]++;
+        CHECK_INT(r.pose.buttons, r.index == unfelt_tool ? PAL_POSE_UNFELT : 0);
+    }
+    CHECK(n_pose[0] > 100 && n_pose[1] > 100);
+}
+
 static void through_switches(void)
 {
     mem_client a, b;
     begin();
     join(&a, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, 0);
     join(&b, "Ben", PAL_WIRE_ROLE_TRAINEE, 1);
+    b.model_seq = 1;
     play(&a, &b, 60);
     CHECK(order(&a, "study_point", "\"index\":1"));
     until_frame(&a);
@@ -112,14 +139,7 @@ static void through_switches(void)
     mem_end(&a), mem_end(&b);
     end();
     replays_equal(5);
-}
-
-static size_t slurp(const char *name, uint8_t *bytes, size_t cap)
-{
-    FILE *file = fopen(name, "rb");
-    size_t n = file ? fread(bytes, 1, cap, file) : 0;
-    if (file) fclose(file);
-    return n;
+    says_who_feels(0);
 }
 
 /* positions of body 0 when a replay has taken its last step */

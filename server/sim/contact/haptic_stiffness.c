@@ -59,7 +59,7 @@ bool pal_haptic_stiffness_find(const pal_haptic_stiffness *known, pal_contact_gr
     if (i < 0) return true;
     pal_scale3(change, group->force_N, group->normal);
     pal_axpy3(change, -e->force_N, e->normal);
-    if (known->time_s - e->time_s < FOLLOW_S * (1 - 1e-9)) return false;
+    if (known->time_s - e->time_s < known->follow_s * (1 - 1e-9)) return false;
     return pal_dist3(e->at_m, at_m) > min_m || pal_norm3(change) > FORCE_SHARE * e->force_N ||
            fabs(group->gap_m - e->gap_m) > min_m;
 }
@@ -208,13 +208,13 @@ void pal_haptic_stiffness_near(pal_haptic_stiffness *known, pal_contact_group *g
 
 void pal_grasp_compliance_update(pal_grasp_compliance *w, const pal_body *body, const pal_compliance *compliance,
                                  const int32_t *node, const double *weight, int n, const double at_m[3], double min_m,
-                                 double step_s, pal_arena *scratch)
+                                 double follow_s, double step_s, pal_arena *scratch)
 {
     double unit[3] = {0}, mean[3];
     int axis = w->next;
     w->since_s += step_s;
     if (!compliance) return;
-    if (w->n_known == 3 && (w->since_s < FOLLOW_S / 3 || (axis == 0 && pal_dist3(w->at_m, at_m) < min_m))) return;
+    if (w->n_known == 3 && (w->since_s < follow_s / 3 || (axis == 0 && pal_dist3(w->at_m, at_m) < min_m))) return;
     unit[axis] = 1;
     size_t used = pal_arena_used(scratch);
     double *answer = PAL_NEW(scratch, double, 3 * (size_t)body->n_node);

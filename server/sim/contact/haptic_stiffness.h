@@ -37,12 +37,13 @@ typedef struct pal_haptic_stiffness_entry {
 } pal_haptic_stiffness_entry;
 typedef struct pal_haptic_stiffness {
     pal_haptic_stiffness_entry entry[PAL_CONTACT_PATCH_MAX];
-    int next;      /* entry to be replaced next */
-    double time_s; /* of the world */
+    int next;        /* entry to be replaced next */
+    double time_s;   /* of the world */
+    double follow_s; /* from one answer to the next */
 } pal_haptic_stiffness;
 
 /* sets group->k_N_m to what is known for it (0: nothing); true: it should be found again, as the tool has moved by more
- * than min_m or the force has changed by FORCE_SHARE, and FOLLOW_S has passed */
+ * than min_m or the force has changed by FORCE_SHARE, and follow_s has passed */
 bool pal_haptic_stiffness_find(const pal_haptic_stiffness *known, pal_contact_group *group, const double at_m[3],
                                double min_m);
 /* the largest known stiffness of a contact, at least k_N_m */
@@ -74,10 +75,10 @@ typedef struct pal_grasp_compliance {
 } pal_grasp_compliance;
 
 /* the next column, unless all are known and the tool has moved by less than min_m or they are found more often than in
- * FOLLOW_S; weight [n] has the sum 1; step_s: time since the last call */
+ * follow_s; weight [n] has the sum 1; step_s: time since the last call */
 void pal_grasp_compliance_update(pal_grasp_compliance *w, const pal_body *body, const pal_compliance *compliance,
                                  const int32_t *node, const double *weight, int n, const double at_m[3], double min_m,
-                                 double step_s, pal_arena *scratch);
+                                 double follow_s, double step_s, pal_arena *scratch);
 /* K of tissue in series with a spring k, as xx xy xz yy yz zz; false: W_g is not known, or is no compliance */
 bool pal_grasp_compliance_series(const pal_grasp_compliance *w, double k_N_m, double K[6]);
 /* rise of the force for each metre that the spring's end leads the tissue; k_guess_N_m until all of W_g is known */

@@ -9,12 +9,15 @@
 
 enum { PAL_TOOL_MAX = 8, PAL_CONTACT_PATCH_MAX = 4 };
 
+/* pal_pose.buttons: the hand grasps; its client renders no haptic model, so that nobody feels the force */
+enum { PAL_POSE_GRASP = 1, PAL_POSE_UNFELT = 2 };
+
 /* pose of a tool as its client sends it */
 typedef struct pal_pose {
     double position_m[3];
     double quat[4];         /* w x y z, unit */
     double velocity_m_s[3]; /* 0 when unknown */
-    uint32_t buttons;       /* bit 0: grasp */
+    uint32_t buttons;       /* PAL_POSE_* */
     uint32_t seq;           /* client's count, echoed */
     uint64_t stamp_us;      /* client's clock, echoed */
     /* of the device, for status only: what it commanded at this pose, and the opening of its gripper, rad or m */
@@ -48,7 +51,8 @@ typedef struct pal_tool {
     double here_m[3];         /* position at the end of the current sub-step                                  */
     double velocity_m_s[3];   /* of `here`                                                                    */
     double omega_rad_s[3];    /* from the orientation of the last step to this one's, for friction             */
-    bool grasp;               /* bit 0 of requested.buttons while present                                          */
+    bool grasp;               /* PAL_POSE_GRASP of requested while present                                          */
+    bool felt;                /* a device renders its haptic models                                                 */
     double force_N[3];        /* on the tool, this sub-step; CONTACT components add                              */
     double mean_force_N[3];   /* mean over the step's sub-steps                                               */
     double torque_Nm[3];      /* of contacts and grasps about its centre, in the last sub-step; components add */
