@@ -66,7 +66,8 @@ static int pose(pal_client *c, const uint8_t *bytes, size_t n_byte)
         }
         return 0;
     }
-    pal_pose p = {.buttons = (w.buttons & PAL_WIRE_GRASP ? PAL_POSE_GRASP : 0) | (w.model_seq ? 0 : PAL_POSE_UNFELT),
+    pal_pose p = {.buttons =
+                      (w.buttons & PAL_WIRE_GRASP ? PAL_POSE_GRASP : 0) | (w.model_seq ? 0 : PAL_POSE_NO_HAPTICS),
                   .seq = w.seq,
                   .stamp_us = w.stamp_us,
                   .commands_force = w.flags & PAL_WIRE_POSE_FORCES_ON,

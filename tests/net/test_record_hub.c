@@ -94,7 +94,7 @@ static size_t slurp(const char *name, uint8_t *bytes, size_t cap)
 }
 
 /* a pose that names no haptic model is of a hand that feels nothing */
-static void says_who_feels(int unfelt_tool)
+static void names_tools_without_haptics(int tool_without)
 {
     static uint8_t bytes[1 << 20];
     const size_t n = slurp(path, bytes, sizeof bytes);
@@ -106,7 +106,7 @@ static void says_who_feels(int unfelt_tool)
     while (!pal_input_get_record("log", bytes, n, &at, &r, NULL)) {
         if (r.kind != PAL_INPUT_POSE) continue;
         n_pose[r.index]++;
-        CHECK_INT(r.pose.buttons, r.index == unfelt_tool ? PAL_POSE_UNFELT : 0);
+        CHECK_INT(r.pose.buttons, r.index == tool_without ? PAL_POSE_NO_HAPTICS : 0);
     }
     CHECK(n_pose[0] > 100 && n_pose[1] > 100);
 }
@@ -139,7 +139,7 @@ static void through_switches(void)
     mem_end(&a), mem_end(&b);
     end();
     replays_equal(5);
-    says_who_feels(0);
+    names_tools_without_haptics(0);
 }
 
 /* positions of body 0 when a replay has taken its last step */

@@ -101,7 +101,7 @@ bool pal_grasp_settle(void *self, pal_step *step, const double *moved, bool last
         for (int k = 0; k < n_find; k++)
             pal_grasp_compliance_update(&g->compliance, step->body, step->body->compliance, g->node, g->weight,
                                         g->n_node, tool->here_m, SHALLOW_RADII * tool->radius_m,
-                                        tool->felt ? FOLLOW_S : UNFELT_FOLLOW_S, step->dt_s * step->n_sub,
+                                        tool->haptic ? FOLLOW_S : NO_HAPTICS_FOLLOW_S, step->dt_s * step->n_sub,
                                         step->scratch);
         pal_grasp_publish(g, tool, implicit->k_N_m, implicit->k_N_m * grasps->damping_s);
     }

@@ -100,10 +100,10 @@ static void find_stiffness(pal_push *push, pal_tool_contact *t, const pal_tool *
     const pal_tool_contact_implicit *implicit = t->implicit;
     double here[3], radius = tool->radius_m;
     pal_sub3(here, tool->here_m, step->body->offset_m);
-    t->stiffness.time_s = step->time_s, t->stiffness.follow_s = tool->felt ? FOLLOW_S : UNFELT_FOLLOW_S;
+    t->stiffness.time_s = step->time_s, t->stiffness.follow_s = tool->haptic ? FOLLOW_S : NO_HAPTICS_FOLLOW_S;
     const bool due = pal_haptic_stiffness_find(&t->stiffness, group, here, SHALLOW_RADII * radius);
     if (push->n_stiffness >= STIFFNESS_BUDGET || (group->force_N > 0 && implicit && implicit->solve.constant)) return;
-    if (!tool->felt && (!due || group->force_N <= 0)) return;
+    if (!tool->haptic && (!due || group->force_N <= 0)) return;
     if (!due) {
         double k = implicit ? implicit->solve.friction_N_m : 0;
         for (int i = 0; i < t->n_contact && !implicit; i++)

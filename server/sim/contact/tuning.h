@@ -38,7 +38,7 @@ enum { STIFFNESS_PASSES = 2 };
  * patch: slower than frames, faster than a hand */
 #define FOLLOW_S (4 * FRAME_S)
 /* s. The same of a tool whose force nobody feels: only its caps ask for a stiffness then (test_contact_implicit) */
-#define UNFELT_FOLLOW_S 0.5
+#define NO_HAPTICS_FOLLOW_S 0.5
 /* radii. A tool that moved by less is at rest: its stiffness is not found again (0.01 to 0.03 alike,
  * test_contact_implicit). Contact less deep is at its beginning. Path over which a slope is averaged: 5 % longer lags
  * where tissue stiffens (test_tool_push) */

@@ -44,7 +44,7 @@ void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose, double dt_s)
     tool->ramp = pal_blend_toward(tool->ramp, pose ? 1 : 0, dt_s, PAL_BLEND_S);
     tool->present = pose != NULL;
     tool->grasp = tool->present && (tool->requested.buttons & PAL_POSE_GRASP);
-    tool->felt = !(tool->requested.buttons & PAL_POSE_UNFELT);
+    tool->haptic = !(tool->requested.buttons & PAL_POSE_NO_HAPTICS);
     tool->grasped_before = tool->holding;
     tool->touching = tool->holding = false;
     tool->n_patch = 0;

@@ -10,7 +10,7 @@
 enum { PAL_TOOL_MAX = 8, PAL_CONTACT_PATCH_MAX = 4 };
 
 /* pal_pose.buttons: the hand grasps; its client renders no haptic model, so that nobody feels the force */
-enum { PAL_POSE_GRASP = 1, PAL_POSE_UNFELT = 2 };
+enum { PAL_POSE_GRASP = 1, PAL_POSE_NO_HAPTICS = 2 };
 
 /* pose of a tool as its client sends it */
 typedef struct pal_pose {
@@ -52,7 +52,7 @@ typedef struct pal_tool {
     double velocity_m_s[3];   /* of `here`                                                                    */
     double omega_rad_s[3];    /* from the orientation of the last step to this one's, for friction             */
     bool grasp;               /* PAL_POSE_GRASP of requested while present                                          */
-    bool felt;                /* a device renders its haptic models                                                 */
+    bool haptic;              /* a device renders its haptic models                                                 */
     double force_N[3];        /* on the tool, this sub-step; CONTACT components add                              */
     double mean_force_N[3];   /* mean over the step's sub-steps                                               */
     double torque_Nm[3];      /* of contacts and grasps about its centre, in the last sub-step; components add */

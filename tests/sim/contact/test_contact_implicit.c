@@ -139,13 +139,13 @@ static bool count_answer(void *self, const pal_body *body, const double *force_N
 /* a tool that somebody feels has its stiffness found again several times as often as caps alone need it */
 static void keeps_to_its_cap(void)
 {
-    int n_felt[2];
+    int n_haptic[2];
     for (int run = 0; run < 4; run++) {
-        const bool grasp = run & 1, unfelt = run >= 2;
+        const bool grasp = run & 1, mouse = run >= 2;
         const pal_compliance counting = {.solve = count_answer};
         fem_scene f;
         REQUIRE(fem_slab(&f, 10, 10, 5, 0.01, 1, 0.015, 0.3) && tool_scene_open(&f.s));
-        counted = f.s.body->compliance, f.s.body->compliance = &counting, n_answer = 0, f.s.unfelt = unfelt;
+        counted = f.s.body->compliance, f.s.body->compliance = &counting, n_answer = 0, f.s.no_haptics = mouse;
         double max_N = 0, load[3];
         for (int i = 0; i <= 400; i++) {
             double z = 0.066 + (grasp ? 0.0003 : -0.0002) * fmin(i, 100);
@@ -155,13 +155,14 @@ static void keeps_to_its_cap(void)
         }
         sum_loads(f.s.body, load);
         const int n_found = n_answer;
-        if (!unfelt) n_felt[grasp] = n_found;
-        CHECK(n_found > 0 && (!unfelt || 3 * n_found <= n_felt[grasp]));
+        if (!mouse) n_haptic[grasp] = n_found;
+        CHECK(n_found > 0 && (!mouse || 3 * n_found <= n_haptic[grasp]));
         double still = tremble(&f.s, 30), error = static_error(&f.s);
         f.s.body->compliance = counted;
         printf("  %s, %s, %d answers: at most %.9g N, on tissue %.4g N, kinetic %.2g of elastic, %.2g off the static "
                "answer\n",
-               grasp ? "grasp" : "push", unfelt ? "unfelt" : "felt", n_found, max_N, pal_norm3(load), still, error);
+               grasp ? "grasp" : "push", mouse ? "mouse" : "haptic device", n_found, max_N, pal_norm3(load), still,
+               error);
         CHECK_LE(max_N, 0.3 * (1 + 1e-9));
         CHECK(max_N > 0.29);
         /* contact itself keeps 2 % below it: the proxy is held back, the spring not stretched farther */
