@@ -1,0 +1,552 @@
+"""A joined session. A thread of the package receives, decodes, acknowledges and repeats poses; every method may be
+called from any thread and waits at most its timeout."""
+
+import asyncio
+import dataclasses
+import json
+import os
+import threading
+import time
+import urllib.parse
+import urllib.request
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, TypeVar
+
+import numpy as np
+import websockets.client
+import websockets.exceptions
+from numpy.typing import ArrayLike, NDArray
+from websockets.typing import Subprotocol
+
+from . import wire
+from .asset import Asset, decode_asset
+from .control import Message, objects, read_control, text_of, whole
+from .errors import Disconnected, OrderRefused, PalpateError, TookTooLong, WireError
+from .field import Field, decode_field
+from .frame import Frame, FrameDecoder, epoch_of
+from .planes import U32
+from .topology_delta import decode_topology_delta
+from .wire import Haptic, Pose, Tool, Tools, read_haptic, read_tools, write_ack, write_pose
+
+_REPEAT_S = 0.05  # period of the repeated pose of a resting tool: the server releases one that is silent for 0.25 s
+_MESSAGE_MAX = 96 << 20  # bytes, as protocol/README.md, "Limits"
+_ASSET_MAX = 257 << 20  # bytes
+# orders that end with an `answer`; the others are done, or refused, before the `pong` of a ping behind them
+_ANSWERED = frozenset(
+    "seek branch study_point configure delete divide extrude merge bridge sharpen paint set_rest_shape cut uncut "
+    "undo redo probe".split()
+)
+_NOT_OF_AN_ORDER = frozenset(("tool_idle",))
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What an order has done. text: the server's sentence, may be empty; numbers: by their names, which have units."""
+
+    verb: str
+    text: str
+    numbers: dict[str, float]
+
+
+@dataclass
+class _Part:
+    """One part and its newest messages; those that come before its asset are kept."""
+
+    info: Message
+    epoch: int
+    asset: Asset | None = None
+    decoder: FrameDecoder | None = None
+    table: U32 | None = None
+    frame: Frame | None = None
+    field: Field | None = None
+    early_deltas: list[bytes] = dataclasses.field(default_factory=list)
+    early: dict[int, bytes] = dataclasses.field(default_factory=dict)  # by kind
+
+
+@dataclass
+class _Order:
+    verb: str
+    answer: Answer | None = None
+    error: OrderRefused | None = None
+
+
+def _address(url: str, ticket: str | None) -> tuple[str, str]:
+    """Address of the websocket and ticket."""
+    at = urllib.parse.urlsplit(url)
+    scheme = {"http": "ws", "https": "wss"}.get(at.scheme, at.scheme)
+    if scheme not in ("ws", "wss") or not at.netloc:
+        raise PalpateError(f"{url} is no address such as ws://127.0.0.1:8090/ws")
+    path = at.path if at.path not in ("", "/") else "/ws"
+    given = ticket or at.fragment or os.environ.get("PALPATE_TICKET", "")
+    return urllib.parse.urlunsplit((scheme, at.netloc, path, at.query, "")), given
+
+
+def _get(url: str, path: str) -> bytes:
+    """A file of the server of this websocket address."""
+    address = urllib.parse.urljoin("http" + url[2:], path)
+    if urllib.parse.urlsplit(address).netloc != urllib.parse.urlsplit(url).netloc:
+        raise PalpateError("an asset is said to be on another server")
+    with urllib.request.urlopen(address, timeout=60) as answer:
+        data: bytes = answer.read(_ASSET_MAX)
+    return data
+
+
+def join(
+    url: str,
+    *,
+    name: str = "Python",
+    role: str = "trainee",
+    tool: int | None = -1,
+    ticket: str | None = None,
+    timeout: float = 10.0,
+) -> "Session":
+    """Joins the session at `url` and returns it once the server has said hello.
+
+    url: ws[s]:// or http[s]://host[:port][/path][?session=NAME][#TICKET], as the server prints it; default path /ws.
+    role: viewer, trainee or instructor. tool: index of the wanted tool, -1 any free one, None none; a viewer gets none.
+    ticket: else that of the url, else that of the environment variable PALPATE_TICKET. timeout: s. Raises Disconnected
+    with the server's reason, or TookTooLong.
+    """
+    if role not in ("viewer", "trainee", "instructor"):
+        raise PalpateError(f"{role} is no role: viewer, trainee or instructor")
+    address, given = _address(url, ticket)
+    wanted: Message = {"type": "join", "name": name, "role": role, "topology_deltas": True}
+    if tool is not None and role != "viewer":
+        wanted["tool"] = tool
+    session = Session(address, given, wanted)
+    try:
+        session._wait(lambda: session._hello, timeout, "the server has not said hello")
+    except PalpateError:
+        session.close()
+        raise
+    return session
+
+
+class Session:
+    """A joined session, made by join(). A context manager: leaving it closes the connection."""
+
+    def __init__(self, url: str, ticket: str, wanted: Message) -> None:
+        self._url, self._ticket, self._wanted = url, ticket, wanted
+        self._changed = threading.Condition()
+        self._error: PalpateError | None = None
+        self._hello: Message | None = None
+        self._status: Message | None = None
+        self._members: list[Message] = []
+        self._id = 0
+        self._own_tool: int | None = None
+        self._parts: list[_Part] = []
+        self._tools: Tools | None = None
+        self._haptic: Haptic | None = None
+        self._pose_seq = 0
+        self._pose: Pose | None = None
+        self._pong = 0
+        self._ping = 0
+        self._order: _Order | None = None
+        self._ordering = threading.Lock()
+        self._decode_s = 0.0
+        self._socket: websockets.client.WebSocketClientProtocol | None = None
+        self._loop = asyncio.new_event_loop()
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._thread = threading.Thread(target=self._run, name="palpate", daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> "Session":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Ends the connection and its thread. Waiting methods of other threads raise Disconnected."""
+        try:
+            self._loop.call_soon_threadsafe(self._stop)
+        except RuntimeError:
+            pass  # the loop has ended by itself
+        if threading.current_thread() is not self._thread:
+            self._thread.join()
+
+    # what the session is
+
+    @property
+    def hello(self) -> Message:
+        """The server's `hello`: title, parts, tools, box_min_m, box_max_m, up, you (protocol/README.md, "Control")."""
+        assert self._hello is not None  # join returns behind it
+        return self._hello
+
+    @property
+    def members(self) -> list[Message]:
+        """Who is here: id, role, name, tool, rights."""
+        with self._changed:
+            return list(self._members)
+
+    @property
+    def parts(self) -> list[Message]:
+        """The present parts: name, epoch, n_vertex, n_triangle, fields and the rest of their description."""
+        with self._changed:
+            return [part.info for part in self._parts]
+
+    @property
+    def tool(self) -> int | None:
+        """Index of the own tool; None without one."""
+        with self._changed:
+            return self._own_tool
+
+    def status(self, timeout: float = 10.0) -> Message:
+        """The newest `status`, which comes three times a second: sim_time_s, paused, slowdown, step_ms and more."""
+        return self._wait(lambda: self._status, timeout, "no status has come")
+
+    # shapes
+
+    def asset(self, part: int = 0, timeout: float = 60.0) -> Asset:
+        """Rest shape and triangles of a part; loaded in the background after join and after each new epoch."""
+        return self._wait(lambda: self._part(part).asset, timeout, f"the asset of part {part} has not come")
+
+    def triangles(self, part: int = 0, timeout: float = 60.0) -> U32:
+        """The present triangles of a part, [t][3], a copy; without the empty slots of an adaptive part."""
+
+        def shown() -> U32 | None:
+            table = self._part(part).table
+            return None if table is None else table[table.any(axis=1)]
+
+        return self._wait(shown, timeout, f"the asset of part {part} has not come")
+
+    def frame(self, part: int = 0, after: Frame | None = None, timeout: float = 60.0) -> Frame:
+        """The newest frame of a part; with `after` one that is newer. A part at rest has no newer frame."""
+
+        def newest() -> Frame | None:
+            frame = self._part(part).frame
+            if frame and after and (frame.epoch, frame.seq) <= (after.epoch, after.seq):
+                return None
+            return frame
+
+        return self._wait(newest, timeout, f"no newer frame of part {part} has come")
+
+    def subscribe_field(self, part: int, field: str) -> None:
+        """Asks for a field of a part, one of its `fields`; "none" ends it."""
+        self._send({"type": "subscribe_field", "part": part, "field": field})
+
+    def field(self, part: int = 0, after: Field | None = None, timeout: float = 10.0) -> Field:
+        """The newest values of the subscribed field; with `after` newer ones. A part at rest has no newer ones."""
+
+        def newest() -> Field | None:
+            found = self._part(part).field
+            return None if after and found is after else found
+
+        return self._wait(newest, timeout, f"no newer field of part {part} has come")
+
+    # the own tool
+
+    def take_tool(self, tool: int, timeout: float = 10.0) -> None:
+        """Takes a tool that nobody holds; OrderRefused "tool_taken" when somebody does."""
+        self._answered(_Order("take_tool"), {"type": "take_tool", "tool": tool}, timeout)
+        self._wait(lambda: self._own_tool == tool or None, timeout, f"tool {tool} was not given")
+
+    def move(self, position_m: ArrayLike, grasp: bool = False, quaternion: ArrayLike = (1.0, 0.0, 0.0, 0.0)) -> int:
+        """Moves the own tool and returns the number of the pose, for force_N and tools.
+
+        position_m [3]: of the tip, scene frame. grasp: closed; it holds what it touches when it closes. quaternion
+        [4]: w x y z, 1 0 0 0 unknown. The pose is repeated until the next one, or lift(). A tool faster than 5 m/s, or
+        20 sizes of the body a second, is lifted by the server: move it in steps.
+        """
+        return self._put_pose(position_m, quaternion, wire.GRASP if grasp else 0, wire.POSE_ONLY)
+
+    def lift(self) -> int:
+        """Lifts the own tool out of the scene until the next move()."""
+        with self._changed:
+            at = self._pose.position_m if self._pose else (0.0, 0.0, 0.0)
+        return self._put_pose(at, (1.0, 0.0, 0.0, 0.0), 0, wire.POSE_ONLY | wire.AWAY)
+
+    def tools(self, after: int = 0, timeout: float = 10.0) -> Tools:
+        """The newest state of all tools; with `after`, the number of an own pose, one of a step that has used it or a
+        later one."""
+
+        def newest() -> Tools | None:
+            own = self._own()
+            used = after == 0 or (own is not None and own.holder == self._id and own.echo_seq >= after)
+            return self._tools if used else None
+
+        return self._wait(newest, timeout, "no step has used the pose")
+
+    def force_N(self, after: int = 0, timeout: float = 10.0) -> NDArray[np.float64]:
+        """Force of the tissue on the own tool [3], N, scene frame, mean over the step; `after` as for tools()."""
+        found = self.tools(after, timeout)
+        index = self.tool
+        if index is None or index >= len(found.tools):
+            raise PalpateError("this member holds no tool")
+        return found.tools[index].force_N
+
+    @property
+    def contact_model(self) -> Haptic | None:
+        """The newest contact model of the own tool; None before the first."""
+        with self._changed:
+            return self._haptic
+
+    # orders
+
+    def order(self, verb: str, target: str = "", timeout: float = 60.0, **numbers: float) -> Answer:
+        """Gives an order and returns its answer; OrderRefused with the server's code and sentence.
+
+        verb, target and numbers: protocol/README.md, "Commands", and `palpate serve --help-protocol`, with units in
+        the names: order("material", "liver", young_Pa=8000). Edits, probe, cut, configure, seek and branch return when
+        they are done; the others when they are accepted, with an empty answer. timeout: s.
+        """
+        message = {"type": "command", "verb": verb, "target": target, "args": numbers}
+        return self._answered(_Order(verb), message, timeout)
+
+    def _answered(self, order: _Order, message: Message, timeout: float) -> Answer:
+        def ended() -> Answer | None:
+            if order.error:
+                raise order.error
+            if order.answer is None and order.verb not in _ANSWERED and self._pong >= ping:
+                return Answer(order.verb, "", {})
+            return order.answer
+
+        with self._ordering:
+            with self._changed:
+                self._order = order
+                self._ping += 1
+                ping = self._ping
+            self._send(message)
+            self._send({"type": "ping", "stamp_ms": ping})
+            try:
+                return self._wait(ended, timeout, f"{order.verb} was not answered")
+            finally:
+                with self._changed:
+                    self._order = None
+
+    # under the lock
+
+    def _part(self, index: int) -> _Part:
+        if not 0 <= index < len(self._parts):
+            raise PalpateError(f"there is no part {index}, the session has {len(self._parts)}")
+        return self._parts[index]
+
+    def _own(self) -> Tool | None:
+        index = self._own_tool
+        return self._tools.tools[index] if self._tools and index is not None and index < len(self._tools.tools) else None
+
+    def _wait(self, get: Callable[[], T | None], timeout: float, late: str) -> T:
+        """What `get` returns once it is not None."""
+        end = time.monotonic() + timeout
+        with self._changed:
+            while (found := get()) is None:
+                if self._error:
+                    raise self._error
+                left = end - time.monotonic()
+                if left <= 0:
+                    raise TookTooLong(f"{late} within {timeout:g} s")
+                self._changed.wait(left)
+            return found
+
+    # to the server
+
+    def _send(self, message: Message | bytes) -> None:
+        """Hands one message to the thread; the error of an ended connection."""
+        data = message if isinstance(message, bytes) else json.dumps(message)
+        with self._changed:
+            if self._error:
+                raise self._error
+        try:
+            self._loop.call_soon_threadsafe(self._start, data)
+        except RuntimeError as error:
+            raise Disconnected(0, "the connection has ended") from error
+
+    def _start(self, data: str | bytes) -> None:
+        if self._socket:
+            self._spawn(self._write(data))
+
+    async def _write(self, data: str | bytes) -> None:
+        try:
+            if self._socket:
+                await self._socket.send(data)
+        except websockets.exceptions.ConnectionClosed:
+            pass  # reported by the receiving side
+
+    def _put_pose(self, position_m: ArrayLike, quaternion: ArrayLike, buttons: int, flags: int) -> int:
+        with self._changed:
+            if self._error:
+                raise self._error
+            if self._own_tool is None:
+                raise PalpateError("this member holds no tool")
+            pose = Pose(self._own_tool, 0, 0, position_m, flags, quaternion, buttons=buttons)
+            data = self._stamped(pose)
+            self._pose = pose
+            self._send(data)
+            return pose.seq
+
+    def _stamped(self, pose: Pose) -> bytes:
+        pose.stamp_us = time.monotonic_ns() // 1000
+        pose.seq = self._pose_seq + 1
+        data = write_pose(pose)
+        self._pose_seq = pose.seq
+        return data
+
+    # the thread
+
+    def _spawn(self, work: Any) -> None:
+        task: asyncio.Task[None] = self._loop.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    def _stop(self) -> None:
+        for task in asyncio.all_tasks(self._loop):
+            task.cancel()
+
+    def _run(self) -> None:
+        error: PalpateError
+        try:
+            self._loop.run_until_complete(self._live())
+            error = Disconnected(0, "the connection has ended")
+        except asyncio.CancelledError:
+            error = Disconnected(1000, "the session was closed")  # unless the asset's error is there already
+        except PalpateError as found:
+            error = found
+        except websockets.exceptions.ConnectionClosed as closed:
+            end = closed.rcvd or closed.sent
+            code, reason = (end.code, end.reason) if end else (1006, "")
+            error = Disconnected(code, reason or f"the connection has ended with code {code}")
+        except websockets.exceptions.InvalidStatusCode as refused:
+            error = Disconnected(0, f"the server answers with HTTP status {refused.status_code}")
+        except (OSError, asyncio.TimeoutError, websockets.exceptions.WebSocketException) as found:
+            error = Disconnected(0, f"no connection to {self._url}: {str(found) or type(found).__name__}")
+        with self._changed:
+            self._error = self._error or error
+            self._changed.notify_all()
+        self._loop.run_until_complete(self._loop.shutdown_default_executor())
+        self._loop.close()
+
+    async def _live(self) -> None:
+        names = [Subprotocol(wire.PROTOCOL)] + ([Subprotocol("ticket." + self._ticket)] if self._ticket else [])
+        async with websockets.client.connect(
+            self._url, subprotocols=names, compression=None, max_size=_MESSAGE_MAX, open_timeout=10, close_timeout=2
+        ) as socket:
+            self._socket = socket
+            await socket.send(json.dumps(self._wanted))
+            self._spawn(self._repeat())
+            async for data in socket:
+                begin = time.perf_counter()
+                with self._changed:
+                    ack = self._take(data)
+                    self._changed.notify_all()
+                self._decode_s += time.perf_counter() - begin
+                if ack is not None:
+                    await socket.send(write_ack(ack, int(1e6 * self._decode_s)))
+                    self._decode_s = 0.0
+
+    async def _repeat(self) -> None:
+        while True:
+            await asyncio.sleep(_REPEAT_S)
+            with self._changed:
+                data = self._stamped(self._pose) if self._pose and self._pose.tool == self._own_tool else None
+            if data:
+                await self._write(data)
+
+    async def _load(self, index: int, part: _Part, path: str) -> None:
+        """Fetches and decodes the asset of a part, then what came before it."""
+
+        def load() -> tuple[Asset, FrameDecoder]:
+            asset = decode_asset(_get(self._url, path))
+            return asset, FrameDecoder(asset)
+
+        try:
+            asset, decoder = await self._loop.run_in_executor(None, load)
+            with self._changed:
+                part.asset, part.decoder, part.table = asset, decoder, asset.triangles.copy()
+                for data in part.early_deltas:
+                    self._take_part(part, wire.TOPOLOGY_DELTA, data)
+                for kind, data in part.early.items():
+                    self._take_part(part, kind, data)
+                part.early_deltas, part.early = [], {}
+                self._changed.notify_all()
+        except (OSError, PalpateError) as error:
+            with self._changed:
+                if part not in self._parts:
+                    return  # replaced meanwhile: its file may be gone
+                self._error = PalpateError(f"the asset of part {index} is not loaded: {error}")
+                self._changed.notify_all()
+            self._stop()
+
+    # messages, under the lock
+
+    def _take(self, data: str | bytes) -> int | None:
+        """One message of the server. Returns the cycle to acknowledge, if it closes one."""
+        if isinstance(data, str):
+            self._take_control(read_control(data))
+            return None
+        kind, _, _ = wire.read_head(data)
+        if kind == wire.TOOLS:
+            self._tools = read_tools(data)
+            return self._tools.cycle
+        if kind == wire.HAPTIC:
+            self._haptic = read_haptic(data)
+        elif kind in (wire.FRAME, wire.FIELD, wire.TOPOLOGY_DELTA):
+            index, _ = epoch_of(data)
+            if index < len(self._parts):
+                self._take_part(self._parts[index], kind, data)
+        return None
+
+    def _take_part(self, part: _Part, kind: int, data: bytes) -> None:
+        if epoch_of(data)[1] != part.epoch:
+            return  # of an older epoch: control overtakes frames, so `topology` comes before the frames of its epoch
+        if part.asset is None or part.decoder is None or part.table is None:
+            if kind == wire.TOPOLOGY_DELTA:
+                part.early_deltas.append(data)
+            else:
+                part.early[kind] = data
+        elif kind == wire.FRAME:
+            part.frame = part.decoder.decode(data)
+        elif kind == wire.FIELD:
+            part.field = decode_field(data, len(part.asset.rest_m))
+        else:
+            delta = decode_topology_delta(data, len(part.table), len(part.asset.rest_m))
+            part.table[delta.slots] = delta.triangles
+
+    def _take_control(self, message: Message) -> None:
+        kind = message["type"]
+        if kind == "hello":
+            you = message.get("you")
+            if not isinstance(you, dict):
+                raise WireError("JSON", "a hello does not say who this member is")
+            self._id = whole(you, "id")
+            self._own_tool = None if you.get("tool") is None else whole(you, "tool")
+            self._replace_parts(objects(message, "parts"))
+            self._hello = message
+        elif kind == "topology":
+            self._replace_parts(objects(message, "parts"))
+        elif kind == "status":
+            self._status = message
+        elif kind == "members":
+            self._members = objects(message, "members")
+            own = next((m for m in self._members if m.get("id") == self._id), None)
+            if own:
+                self._own_tool = None if own.get("tool") is None else whole(own, "tool")
+        elif kind == "pong":
+            self._pong = whole(message, "stamp_ms")
+        elif kind == "answer" and self._order and message.get("verb") == self._order.verb:
+            numbers = message.get("args", {})
+            good = isinstance(numbers, dict) and all(isinstance(v, (int, float)) for v in numbers.values())
+            if not good:
+                raise WireError("JSON", "the numbers of an answer are none")
+            self._order.answer = Answer(self._order.verb, str(message.get("text", "")), numbers)
+        elif kind == "error" and self._order and message.get("code") not in _NOT_OF_AN_ORDER:
+            self._order.error = OrderRefused(text_of(message, "code"), text_of(message, "text"))
+
+    def _replace_parts(self, infos: list[Message]) -> None:
+        """New parts, and those of a new epoch, load their assets; the others stay."""
+        parts: list[_Part] = []
+        for index, info in enumerate(infos):
+            epoch, path = whole(info, "epoch"), text_of(info, "asset")
+            old = self._parts[index] if index < len(self._parts) else None
+            if old and old.epoch == epoch:
+                old.info = info
+                parts.append(old)
+                continue
+            parts.append(_Part(info, epoch))
+            self._spawn(self._load(index, parts[-1], path))
+        self._parts = parts
