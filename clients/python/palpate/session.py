@@ -1,8 +1,10 @@
-"""A joined session. A thread of the package receives, decodes, acknowledges and repeats poses; every method may be
-called from any thread and waits at most its timeout."""
+"""A joined session. A thread of the package receives, acknowledges and repeats poses; every method may be called from
+any thread and waits at most its timeout. Frames and fields are decoded by the method that asks for them, so that a
+script that reads forces alone decodes none."""
 
 import asyncio
 import dataclasses
+import http.client
 import json
 import os
 import threading
@@ -52,22 +54,21 @@ class Answer:
     numbers: dict[str, float]
 
 
-@dataclass
+@dataclass(eq=False)
 class _Part:
-    """One part and its newest messages; those that come before its asset are kept."""
+    """One part and its newest messages. Those of frame and field are decoded when they are asked for."""
 
     info: Message
     epoch: int
     asset: Asset | None = None
     decoder: FrameDecoder | None = None
     table: U32 | None = None
-    frame: Frame | None = None
-    field: Field | None = None
-    early_deltas: list[bytes] = dataclasses.field(default_factory=list)
-    early: dict[int, bytes] = dataclasses.field(default_factory=dict)  # by kind
+    frame: bytes | None = None
+    field: bytes | None = None
+    early_deltas: list[bytes] = dataclasses.field(default_factory=list)  # came before the asset
 
 
-@dataclass
+@dataclass(eq=False)
 class _Order:
     verb: str
     answer: Answer | None = None
@@ -83,6 +84,11 @@ def _address(url: str, ticket: str | None) -> tuple[str, str]:
     path = at.path if at.path not in ("", "/") else "/ws"
     given = ticket or at.fragment or os.environ.get("PALPATE_TICKET", "")
     return urllib.parse.urlunsplit((scheme, at.netloc, path, at.query, "")), given
+
+
+def _number(data: bytes, at: int, n_byte: int) -> int:
+    """A whole number of a message, before it is decoded."""
+    return int.from_bytes(data[at : at + n_byte], "little")
 
 
 def _get(url: str, path: str) -> bytes:
@@ -147,7 +153,6 @@ class Session:
         self._ping = 0
         self._order: _Order | None = None
         self._ordering = threading.Lock()
-        self._decode_s = 0.0
         self._socket: websockets.client.WebSocketClientProtocol | None = None
         self._loop = asyncio.new_event_loop()
         self._tasks: set[asyncio.Task[None]] = set()
@@ -217,33 +222,43 @@ class Session:
         return self._wait(shown, timeout, f"the asset of part {part} has not come")
 
     def frame(self, part: int = 0, after: Frame | None = None, timeout: float = 60.0) -> Frame:
-        """The newest frame of a part; with `after` one that is newer. A part at rest has no newer frame."""
+        """The newest frame of a part; with `after` another than that one. A part at rest has no newer frame."""
 
-        def newest() -> Frame | None:
-            frame = self._part(part).frame
-            if frame and after and (frame.epoch, frame.seq) <= (after.epoch, after.seq):
+        def newest() -> tuple[FrameDecoder, bytes] | None:
+            found = self._part(part)
+            old = after and (after.epoch, after.seq)
+            if found.decoder is None or found.frame is None or (found.epoch, _number(found.frame, 12, 4)) == old:
                 return None
-            return frame
+            return found.decoder, found.frame
 
-        return self._wait(newest, timeout, f"no newer frame of part {part} has come")
+        decoder, data = self._wait(newest, timeout, f"no newer frame of part {part} has come")
+        return decoder.decode(data)
 
     def subscribe_field(self, part: int, field: str) -> None:
         """Asks for a field of a part, one of its `fields`; "none" ends it."""
         self._send({"type": "subscribe_field", "part": part, "field": field})
 
-    def field(self, part: int = 0, after: Field | None = None, timeout: float = 10.0) -> Field:
-        """The newest values of the subscribed field; with `after` newer ones. A part at rest has no newer ones."""
+    def field(self, part: int = 0, after: Field | None = None, timeout: float = 60.0) -> Field:
+        """The newest values of the subscribed field; with `after` those of another time. A part at rest has no newer
+        ones."""
 
-        def newest() -> Field | None:
-            found = self._part(part).field
-            return None if after and found is after else found
+        def newest() -> tuple[bytes, int] | None:
+            found = self._part(part)
+            old = after and (after.epoch, after.sim_time_us)
+            if found.asset is None or found.field is None or (found.epoch, _number(found.field, 16, 8)) == old:
+                return None
+            return found.field, len(found.asset.rest_m)
 
-        return self._wait(newest, timeout, f"no newer field of part {part} has come")
+        data, n_vertex = self._wait(newest, timeout, f"no newer field of part {part} has come")
+        return decode_field(data, n_vertex)
 
     # the own tool
 
     def take_tool(self, tool: int, timeout: float = 10.0) -> None:
         """Takes a tool that nobody holds; OrderRefused "tool_taken" when somebody does."""
+        n_tool = len(objects(self.hello, "tools"))
+        if not 0 <= tool < n_tool:
+            raise PalpateError(f"there is no tool {tool}, the session has {n_tool}")
         self._answered(_Order("take_tool"), {"type": "take_tool", "tool": tool}, timeout)
         self._wait(lambda: self._own_tool == tool or None, timeout, f"tool {tool} was not given")
 
@@ -348,7 +363,10 @@ class Session:
 
     def _send(self, message: Message | bytes) -> None:
         """Hands one message to the thread; the error of an ended connection."""
-        data = message if isinstance(message, bytes) else json.dumps(message)
+        try:
+            data = message if isinstance(message, bytes) else json.dumps(message, allow_nan=False)
+        except (TypeError, ValueError) as error:
+            raise PalpateError(f"a message has a number that is none: {error}") from error
         with self._changed:
             if self._error:
                 raise self._error
@@ -413,13 +431,18 @@ class Session:
             error = Disconnected(code, reason or f"the connection has ended with code {code}")
         except websockets.exceptions.InvalidStatusCode as refused:
             error = Disconnected(0, f"the server answers with HTTP status {refused.status_code}")
-        except (OSError, asyncio.TimeoutError, websockets.exceptions.WebSocketException) as found:
+        except (OSError, ValueError, asyncio.TimeoutError, websockets.exceptions.WebSocketException) as found:
             error = Disconnected(0, f"no connection to {self._url}: {str(found) or type(found).__name__}")
         with self._changed:
             self._error = self._error or error
             self._changed.notify_all()
-        self._loop.run_until_complete(self._loop.shutdown_default_executor())
+        self._stop()
+        self._loop.run_until_complete(self._end())
         self._loop.close()
+
+    async def _end(self) -> None:
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await self._loop.shutdown_default_executor()
 
     async def _live(self) -> None:
         names = [Subprotocol(wire.PROTOCOL)] + ([Subprotocol("ticket." + self._ticket)] if self._ticket else [])
@@ -430,14 +453,11 @@ class Session:
             await socket.send(json.dumps(self._wanted))
             self._spawn(self._repeat())
             async for data in socket:
-                begin = time.perf_counter()
                 with self._changed:
-                    ack = self._take(data)
+                    cycle = self._take(data)
                     self._changed.notify_all()
-                self._decode_s += time.perf_counter() - begin
-                if ack is not None:
-                    await socket.send(write_ack(ack, int(1e6 * self._decode_s)))
-                    self._decode_s = 0.0
+                if cycle is not None:
+                    await socket.send(write_ack(cycle, 0))  # frames are decoded when they are asked for
 
     async def _repeat(self) -> None:
         while True:
@@ -460,11 +480,9 @@ class Session:
                 part.asset, part.decoder, part.table = asset, decoder, asset.triangles.copy()
                 for data in part.early_deltas:
                     self._take_part(part, wire.TOPOLOGY_DELTA, data)
-                for kind, data in part.early.items():
-                    self._take_part(part, kind, data)
-                part.early_deltas, part.early = [], {}
+                part.early_deltas = []
                 self._changed.notify_all()
-        except (OSError, PalpateError) as error:
+        except (OSError, ValueError, http.client.HTTPException, PalpateError) as error:
             with self._changed:
                 if part not in self._parts:
                     return  # replaced meanwhile: its file may be gone
@@ -494,15 +512,12 @@ class Session:
     def _take_part(self, part: _Part, kind: int, data: bytes) -> None:
         if epoch_of(data)[1] != part.epoch:
             return  # of an older epoch: control overtakes frames, so `topology` comes before the frames of its epoch
-        if part.asset is None or part.decoder is None or part.table is None:
-            if kind == wire.TOPOLOGY_DELTA:
-                part.early_deltas.append(data)
-            else:
-                part.early[kind] = data
-        elif kind == wire.FRAME:
-            part.frame = part.decoder.decode(data)
+        if kind == wire.FRAME:
+            part.frame = data
         elif kind == wire.FIELD:
-            part.field = decode_field(data, len(part.asset.rest_m))
+            part.field = data
+        elif part.asset is None or part.table is None:
+            part.early_deltas.append(data)
         else:
             delta = decode_topology_delta(data, len(part.table), len(part.asset.rest_m))
             part.table[delta.slots] = delta.triangles

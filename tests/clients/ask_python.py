@@ -1,0 +1,408 @@
+"""What clients/python answers: to golden packets and bad bytes, and beside a real server.
+
+usage: ask_python.py packets FOLDER | touch URL | sculpt URL TICKET | adapt URL
+Prints a line for each question; exit code 1 when an answer is wrong.
+"""
+
+import asyncio
+import json
+import pathlib
+import struct
+import sys
+import threading
+
+import numpy as np
+import palpate
+import websockets.server
+
+WAIT_S = 100  # only ends what hangs
+
+
+def f32(values):
+    return np.array(values, dtype=np.float32)
+
+
+def need(good, text):
+    if not good:
+        raise AssertionError(text)
+
+
+def refused(call, kind=palpate.PalpateError):
+    """The error of the call, whose text is one sentence; None without one. Any other error goes on."""
+    try:
+        call()
+    except kind as error:
+        need(str(error) and "\n" not in str(error), f"no sentence: {error!r}")
+        return error
+    return None
+
+
+class Packets:
+    """The golden packets."""
+
+    def __init__(self, folder):
+        self.folder = pathlib.Path(folder)
+        self.wanted = json.loads(self.load("expected.json"))
+        self.asset = palpate.decode_asset(self.load("asset.bin"))
+        self.decoder = palpate.FrameDecoder(self.asset)
+        n, n_slot = len(self.asset.rest_m), len(self.asset.triangles)
+        self.frames = [f"frame_{frame['name']}.bin" for frame in self.wanted["frames"]]
+        self.readers = {
+            "tools.bin": palpate.read_tools,
+            "haptic.bin": palpate.read_haptic,
+            "field.bin": lambda data: palpate.decode_field(data, self.wanted["field"]["n"]),
+            "topology_delta.bin": lambda data: palpate.decode_topology_delta(data, n_slot, n),
+            "asset.bin": palpate.decode_asset,
+            **{name: self.decoder.decode for name in self.frames},
+        }
+
+    def load(self, name):
+        return (self.folder / name).read_bytes()
+
+    def pose_and_ack_are_written_byte_for_byte(self):
+        p, ack = self.wanted["pose"], self.wanted["ack"]
+        pose = palpate.Pose(
+            p["tool"], p["seq"], p["stampUs"], p["position"], p["flags"], p["quaternion"], p["velocity"], p["omega"],
+            p["force"], p["torque"], p["gripper"], p["buttons"], p["modelSeq"], p["modelAgeUs"], p["modelStampUs"],
+        )  # fmt: skip
+        need(palpate.write_pose(pose) == self.load("pose.bin"), "pose")
+        need(palpate.write_ack(ack["cycle"], ack["decodeUs"]) == self.load("ack.bin"), "ack")
+
+    def tools_have_their_numbers(self):
+        got, wanted = palpate.read_tools(self.load("tools.bin")), self.wanted["tools"]
+        need((got.cycle, got.sim_time_us) == (wanted["cycle"], wanted["simTimeUs"]), "head")
+        need(len(got.tools) == len(wanted["tools"]), "number of tools")
+        for tool, w in zip(got.tools, wanted["tools"], strict=True):
+            whole = (tool.holder, tool.flags, tool.colour, tool.echo_seq, tool.hold_us, tool.echo_stamp_us)
+            need(whole == tuple(w[k] for k in ("holder", "flags", "colour", "echoSeq", "holdUs", "echoStampUs")), "whole")
+            got_floats = f32([tool.radius_m, *tool.position_m, *tool.quaternion, *tool.force_N])
+            need((got_floats == f32([w["radius"], *w["position"], *w["quaternion"], *w["force"]])).all(), "floats")
+            need(tool.held == bool(w["flags"] & 1) and tool.away == bool(w["flags"] & 16), "flags")
+
+    def contact_model_has_its_numbers(self):
+        got, w = palpate.read_haptic(self.load("haptic.bin")), self.wanted["haptic"]
+        whole = (got.tool, got.seq, got.flags, got.stamp_us, got.echo_stamp_us, got.echo_seq, got.hold_us, got.frame_us)
+        names = ("tool", "seq", "flags", "stampUs", "echoStampUs", "echoSeq", "holdUs", "frameUs")
+        need(whole == tuple(w[k] for k in names), "whole numbers")
+        need(got.origin_m.tolist() == w["origin"], "origin")
+        g, wg = got.grasp, w["grasp"]
+        have = f32([*got.force_ref_N, *got.torque_ref_N_m, *g.x0_m, *g.f0_N, *g.k_N_m, g.b_N_s_m, *g.arm_m])
+        want = f32([*w["fRef"], *w["torqueRef"], *wg["x0"], *wg["f0"], *wg["k"], wg["b"], *wg["arm"]])
+        need((have == want).all(), "reference and grasp")
+        for p, wp in zip(got.contact_patches, w["contact_patches"], strict=True):
+            have = [p.id, p.group, *p.p_m, *p.n, *p.v_m_s, p.k1_N_m, p.k2_N_m2, p.b_N_s_m, p.kt_N_m]
+            have += [p.mu_s, p.mu_d, p.radius_m]
+            names = ("k1", "k2", "b", "kt", "muS", "muD", "radius")
+            want = [wp["id"], wp["group"], *wp["p"], *wp["n"], *wp["v"], *(wp[k] for k in names)]
+            need((f32(have) == f32(want)).all(), "patch")
+
+    def field_has_its_numbers(self):
+        w = self.wanted["field"]
+        got = self.readers["field.bin"](self.load("field.bin"))
+        need((got.part, got.epoch, got.sim_time_us) == (w["part"], w["epoch"], w["simTimeUs"]), "head")
+        need((got.name, got.low, got.high) == ("von_mises", w["low"], w["high"]), "range")
+        need(got.level.tolist() == w["level"], "level")
+        need(got.values[got.level == 255].tolist() == [w["high"]], "the largest value")
+
+    def asset_has_its_numbers(self):
+        w, a = self.wanted["asset"], self.asset
+        need((a.rest_m.ravel() == f32(w["rest"])).all(), "rest")
+        have = {"triangles": a.triangles, "vertexOf": a.vertex_of, "neighbour": a.neighbour, "weight": a.weight}
+        for name, array in have.items():
+            need(array.ravel().tolist() == w[name], name)
+        need(len(a.levels) == w["levels"] and a.look is None and a.uv is None, "levels and looks")
+
+    def topology_delta_gives_its_table(self):
+        w = self.wanted["topology_delta"]
+        got = self.readers["topology_delta.bin"](self.load("topology_delta.bin"))
+        need((got.part, got.epoch, got.revision) == (w["part"], w["epoch"], w["revision"]), "head")
+        need(got.slots.tolist() == w["slots"] and got.triangles.ravel().tolist() == w["corners"], "slots")
+        table = self.asset.triangles.copy()
+        table[got.slots] = got.triangles
+        need(table.ravel().tolist() == w["triangles"], "table")
+
+    def frames_in_any_order_have_the_same_bits(self):
+        for w in [*self.wanted["frames"], *reversed(self.wanted["frames"])]:
+            got = self.decoder.decode(self.load(f"frame_{w['name']}.bin"))
+            whole = (got.part, got.epoch, got.seq, got.cycle, got.sim_time_us)
+            need(whole == tuple(w[k] for k in ("part", "epoch", "seq", "cycle", "simTimeUs")), w["name"])
+            need(np.float32(got.q_m) == np.float32(w["q"]), w["name"])
+            need((got.positions_m.ravel() == f32(w["positions"])).all(), w["name"])
+
+    def every_cut_and_every_further_byte_is_refused(self):
+        for name, read in self.readers.items():
+            data = self.load(name)
+            for n in range(len(data)):
+                need(refused(lambda: read(data[:n]), palpate.WireError), f"{name} cut to {n}")
+            need(refused(lambda: read(data + b"\0"), palpate.WireError), f"{name} with a byte too many")
+
+    def changed_bytes_are_refused_or_read(self):
+        n_refused = 0
+        for name, read in self.readers.items():
+            data = self.load(name)
+            for at in range(len(data)):
+                for value in {0, 255, data[at] ^ 16}:
+                    bad = data[:at] + bytes([value]) + data[at + 1 :]
+                    if name == "asset.bin" and at >= 40:  # with its checksum, or all else would not be reached
+                        bad = bad[:28] + struct.pack("<I", fnv1a(bad[40:])) + bad[32:]
+                    n_refused += refused(lambda: read(bad), palpate.WireError) is not None
+        need(n_refused > 1000, f"{n_refused} refusals")
+
+    def changed_codes_are_refused_or_read(self):
+        n_refused = 0
+        for name in self.frames:
+            data = self.load(name)
+            at = 92 if data[5] else 44
+            raw = expanded(data[at:])
+            for i in range(len(raw)):
+                for value in {0, 85, 255, raw[i] ^ 16}:
+                    block = literals(raw[:i] + bytes([value]) + raw[i + 1 :])
+                    bad = data[:40] + struct.pack("<I", len(block)) + data[44:at] + block
+                    n_refused += refused(lambda: self.decoder.decode(bad), palpate.WireError) is not None
+        need(n_refused > 100, f"{n_refused} refusals")
+
+    def control_messages_are_objects_with_a_type(self):
+        lines = self.load("control.jsonl").decode().splitlines()
+        need([palpate.read_control(line) for line in lines] == [json.loads(line) for line in lines], "numbers")
+        for bad in ("", "[]", "1", "{}", '{"type":1}', '{"type":"hello","x":NaN}', "[" * 60000, '{"type":"hello"'):
+            need(refused(lambda: palpate.read_control(bad), palpate.WireError), bad[:20])
+
+    def bad_messages_of_a_server_end_a_session_with_their_sentence(self):
+        hello = self.load("control.jsonl").decode().splitlines()[0]
+        alone = json.dumps({**json.loads(hello), "parts": []})
+        for messages, text in (
+            ([alone, b"no message"], "a message does not begin with PAL1"),
+            ([alone, "no message"], "a text message is not JSON"),
+            ([alone, '{"type":"topology","parts":1}'], "parts of a message is no list of objects"),
+            (['{"type":"hello"}'], "a hello does not say who this member is"),
+            ([hello], "the asset of part"),
+        ):
+            with fake_server(messages) as url:
+                error = refused(lambda: palpate.join(url, timeout=WAIT_S).tools(timeout=WAIT_S))
+            need(error and text in str(error), f"{error!r} instead of {text}")
+
+    def what_a_caller_gives_wrongly_is_told(self):
+        for position in ([0, 0], [0, 0, "x"], [0, 0, float("nan")], [0, 0, 1001]):
+            need(refused(lambda: palpate.write_pose(palpate.Pose(0, 1, 0, position))), str(position))
+        need(refused(lambda: palpate.write_pose(palpate.Pose(0, 1, 0, [0, 0, 0], quaternion=[1, 1, 0, 0]))), "quaternion")
+        need(refused(lambda: palpate.write_pose(palpate.Pose(-1, 1, 0, [0, 0, 0]))), "tool")
+        need(refused(lambda: palpate.write_pose(palpate.Pose(0, 1, 0, [0, 0, 0], opening=1e300))), "opening")
+        need("is no address" in str(refused(lambda: palpate.join("liver"))), "address")
+        need("is no role" in str(refused(lambda: palpate.join("ws://127.0.0.1:1/ws", role="surgeon"))), "role")
+        need(refused(lambda: palpate.join("ws://127.0.0.1:1/ws"), palpate.Disconnected), "nobody is there")
+
+
+def fnv1a(data):
+    value = 0x811C9DC5
+    for byte in data:
+        value = (value ^ byte) * 16777619 & 0xFFFFFFFF
+    return value
+
+
+def expanded(block):
+    from palpate import lz4
+
+    for n in range(1 << 16):
+        try:
+            return lz4.expand(block, n)
+        except palpate.WireError:
+            pass
+    raise AssertionError("no length fits")
+
+
+def literals(data):
+    """An LZ4 block without a match."""
+    n = len(data)
+    if n < 15:
+        return bytes([n << 4]) + data
+    more, rest = divmod(n - 15, 255)
+    return b"\xf0" + b"\xff" * more + bytes([rest]) + data
+
+
+class fake_server:
+    """A server in a thread of its own that sends these messages to whoever joins."""
+
+    def __init__(self, messages):
+        self.messages = messages
+        self.loop = asyncio.new_event_loop()
+        self.ready = threading.Event()
+        self.thread = threading.Thread(target=lambda: self.loop.run_until_complete(self.run()))
+
+    async def run(self):
+        async def answer(socket):
+            await socket.recv()
+            for message in self.messages:
+                await socket.send(message)
+            await socket.wait_closed()
+
+        self.end = asyncio.Event()
+        def no_file(path, headers):
+            return None if path == "/ws" else (404, [], b"")
+
+        names = ["palpate.v2"]
+        async with websockets.server.serve(answer, "127.0.0.1", 0, subprotocols=names, process_request=no_file) as server:
+            self.port = server.sockets[0].getsockname()[1]
+            self.ready.set()
+            await self.end.wait()
+
+    def __enter__(self):
+        self.thread.start()
+        self.ready.wait()
+        return f"ws://127.0.0.1:{self.port}/ws"
+
+    def __exit__(self, *error):
+        self.loop.call_soon_threadsafe(self.end.set)
+        self.thread.join()
+
+
+def climb(session, top_m, up, from_m, to_m, grasp):
+    """Moves the tool in steps of half a millimetre, each of which a step of the simulation has used."""
+    for height in np.linspace(from_m, to_m, 1 + int(abs(to_m - from_m) / 5e-4)):
+        session.force_N(after=session.move(top_m + height * up, grasp), timeout=WAIT_S)
+
+
+def pull(session, height_m):
+    """Grasps the top of part 0 and pulls it up by so much; the place of the tool."""
+    up = np.array([0.0, 0.0, 1.0])
+    rest = session.asset(timeout=WAIT_S).rest_m
+    top = rest[np.argmax(rest @ up)]
+    radius = session.hello["tools"][session.tool]["radius_m"]
+    climb(session, top, up, radius + 0.005, 0.5 * radius, False)
+    for _ in range(5000):  # until it holds the tissue
+        pose = session.move(top + 0.5 * radius * up, grasp=True)
+        if session.tools(after=pose, timeout=WAIT_S).tools[session.tool].grasps:
+            break
+    climb(session, top, up, 0.5 * radius, 0.5 * radius + height_m, True)
+    return top + (0.5 * radius + height_m) * up
+
+
+class Touch:
+    """A ball of 40 mm, for everybody."""
+
+    def __init__(self, url):
+        self.session = palpate.join(url, name="Ada", timeout=WAIT_S)
+
+    def who_joins_is_told_what_is_there(self):
+        s = self.session
+        need(s.hello["title"] == "Ball" and len(s.hello["tools"]) == 3 and s.tool == 0, "hello")
+        need(s.hello["you"]["role"] == "trainee" and s.hello["you"]["name"] == "Ada", "you")
+        need(s.status(WAIT_S)["paused"] is False, "status")
+        asset = s.asset(timeout=WAIT_S)
+        need(asset.rest_m.shape == (s.parts[0]["n_vertex"], 3), "shape of the asset")
+        need(len(s.triangles()) == s.parts[0]["n_triangle"], "triangles")
+        # without gravity the ball stays as it is, within the error of the part
+        off = np.abs(s.frame(timeout=WAIT_S).positions_m - asset.rest_m).max()
+        need(off <= 1.001 * s.parts[0]["error_m"], f"{off} m from rest")
+
+    def a_tool_that_pulls_feels_force_and_moves_tissue(self):
+        s = self.session
+        at, rest = pull(s, 0.01), s.asset().rest_m
+        force = s.force_N(after=s.move(at, grasp=True), timeout=WAIT_S)
+        need(-force[2] > 0, f"{force} N on a tool that pulls up")
+        frame = s.frame(timeout=WAIT_S)
+        for _ in range(5000):
+            if (frame.positions_m - rest)[:, 2].max() > 0.005:
+                break
+            frame = s.frame(after=frame, timeout=WAIT_S)
+        up = (frame.positions_m - rest)[:, 2].max()
+        need(0.005 < up < 0.015, f"the top has moved by {up} m")
+
+    def values_of_a_field_come(self):
+        s = self.session
+        s.subscribe_field(0, "displacement")
+        field = s.field(timeout=WAIT_S)
+        need(field.name == "displacement" and field.values.shape == (len(s.asset().rest_m),), "shape")
+        need(0.005 < field.high < 0.015, f"{field.high} m")
+
+    def orders_are_answered_or_refused(self):
+        s = self.session
+        need(s.order("pause", timeout=WAIT_S) == palpate.Answer("pause", "", {}), "pause")
+        need(s.order("resume", timeout=WAIT_S) == palpate.Answer("resume", "", {}), "resume")
+        need(s.order("material", "ball", young_Pa=5000.0, timeout=WAIT_S).verb == "material", "material")
+        for code, verb, target, numbers in (
+            ("verb", "fly", "", {}),
+            ("target", "material", "kidney", {"young_Pa": 5000}),
+            ("args", "material", "ball", {"young_kPa": 5}),
+        ):
+            error = refused(lambda: s.order(verb, target, timeout=WAIT_S, **numbers), palpate.OrderRefused)
+            need(error and error.code == code, f"{verb}: {error!r}")
+        need(refused(lambda: s.order("material", "ball", young_Pa=float("nan"))), "a number that is none")
+
+    def a_closed_session_says_so(self):
+        self.session.close()
+        error = refused(lambda: self.session.order("pause"), palpate.Disconnected)
+        need(error and error.code == 1000, f"{error!r}")
+
+
+class Sculpt:
+    """A block of control cells, for who has a ticket."""
+
+    def __init__(self, url, ticket):
+        self.url, self.ticket = url, ticket
+
+    def who_has_no_ticket_watches(self):
+        with palpate.join(self.url, timeout=WAIT_S) as s:
+            need(s.hello["you"]["role"] == "viewer" and s.tool is None, "role")
+            need("holds no tool" in str(refused(lambda: s.move([0, 0, 0]))), "tool")
+        error = refused(lambda: palpate.join(self.url, ticket="A" * 83, timeout=WAIT_S), palpate.Disconnected)
+        need(error and error.code == 1008, f"{error!r}")
+
+    def an_edit_is_answered_and_gives_another_shape(self):
+        with palpate.join(f"{self.url}#{self.ticket}", role="instructor", tool=None, timeout=WAIT_S) as s:
+            rest = s.asset(timeout=WAIT_S).rest_m
+            x, y, z = (float(v) for v in rest[np.argmax(rest @ np.array([0.1, 0.1, 1]))] - np.array([0.02, 0.02, 0]))
+            young = s.order("probe", x_m=x, y_m=y, z_m=z, timeout=WAIT_S).numbers["young_Pa"]
+            need(young > 0, "probe")
+            before = s.parts[0]
+            answer = s.order("extrude", "block", x_m=x, y_m=y, z_m=z, distance_m=0.02, scale=0.8, timeout=WAIT_S)
+            need(answer.numbers["cells"] == 9 and answer.text, f"{answer}")
+            for _ in range(100):  # `topology` comes with a later message
+                if s.parts[0]["epoch"] != before["epoch"]:
+                    break
+                s.order("probe", x_m=x, y_m=y, z_m=z, timeout=WAIT_S)
+            need(s.parts[0]["n_vertex"] > before["n_vertex"], "more vertices")
+            frame = s.frame(timeout=WAIT_S)
+            need(frame.positions_m.shape == s.asset(timeout=WAIT_S).rest_m.shape, "shape of the frame")
+            need(len(frame.positions_m) > len(rest), "a frame of the other shape")
+            error = refused(lambda: s.order("extrude", x_m=9, y_m=0, z_m=0, distance_m=0.1, timeout=WAIT_S))
+            need(error and error.code == "refused", f"{error!r}")
+
+
+class Adapt:
+    """A surface that refines where it is touched."""
+
+    def __init__(self, url):
+        self.session = palpate.join(url, timeout=WAIT_S)
+
+    def more_triangles_are_shown_where_it_is_pulled(self):
+        s = self.session
+        before = len(s.triangles(timeout=WAIT_S))
+        at = pull(s, 0.02)
+        for _ in range(5000):
+            now = s.triangles()
+            if len(now) > before:
+                break
+            s.force_N(after=s.move(at, grasp=True), timeout=WAIT_S)
+        need(len(now) > before, f"{before} triangles before, {len(now)} now")
+        edges = np.sort(np.concatenate([now[:, [0, 1]], now[:, [1, 2]], now[:, [2, 0]]]), axis=1)
+        _, uses = np.unique(edges, axis=0, return_counts=True)
+        need((uses == 2).all(), "the surface is closed: every edge has two triangles")
+
+
+def main(part, *args):
+    asked = {"packets": Packets, "touch": Touch, "sculpt": Sculpt, "adapt": Adapt}[part](*args)
+    n_wrong = 0
+    for name, question in vars(type(asked)).items():
+        if name.startswith("__") or name == "load":
+            continue
+        sentence = name.replace("_", " ")
+        try:
+            question(asked)
+            print("ok  ", sentence, flush=True)
+        except Exception as error:  # whatever it is, it is the answer
+            n_wrong += 1
+            print("FAIL", sentence, f"({type(error).__name__}: {error})", flush=True)
+    return 1 if n_wrong else 0
+
+
+sys.exit(main(*sys.argv[1:]))
