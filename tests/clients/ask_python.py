@@ -74,7 +74,8 @@ class Packets:
         need(len(got.tools) == len(wanted["tools"]), "number of tools")
         for tool, w in zip(got.tools, wanted["tools"], strict=True):
             whole = (tool.holder, tool.flags, tool.colour, tool.echo_seq, tool.hold_us, tool.echo_stamp_us)
-            need(whole == tuple(w[k] for k in ("holder", "flags", "colour", "echoSeq", "holdUs", "echoStampUs")), "whole")
+            names = ("holder", "flags", "colour", "echoSeq", "holdUs", "echoStampUs")
+            need(whole == tuple(w[k] for k in names), "whole numbers")
             got_floats = f32([tool.radius_m, *tool.position_m, *tool.quaternion, *tool.force_N])
             need((got_floats == f32([w["radius"], *w["position"], *w["quaternion"], *w["force"]])).all(), "floats")
             need(tool.held == bool(w["flags"] & 1) and tool.away == bool(w["flags"] & 16), "flags")
@@ -184,7 +185,8 @@ class Packets:
     def what_a_caller_gives_wrongly_is_told(self):
         for position in ([0, 0], [0, 0, "x"], [0, 0, float("nan")], [0, 0, 1001]):
             need(refused(lambda: palpate.write_pose(palpate.Pose(0, 1, 0, position))), str(position))
-        need(refused(lambda: palpate.write_pose(palpate.Pose(0, 1, 0, [0, 0, 0], quaternion=[1, 1, 0, 0]))), "quaternion")
+        turned = palpate.Pose(0, 1, 0, [0, 0, 0], quaternion=[1, 1, 0, 0])
+        need(refused(lambda: palpate.write_pose(turned)), "quaternion")
         need(refused(lambda: palpate.write_pose(palpate.Pose(-1, 1, 0, [0, 0, 0]))), "tool")
         need(refused(lambda: palpate.write_pose(palpate.Pose(0, 1, 0, [0, 0, 0], opening=1e300))), "opening")
         need("is no address" in str(refused(lambda: palpate.join("liver"))), "address")
@@ -240,7 +242,8 @@ class fake_server:
             return None if path == "/ws" else (404, [], b"")
 
         names = ["palpate.v2"]
-        async with websockets.server.serve(answer, "127.0.0.1", 0, subprotocols=names, process_request=no_file) as server:
+        serve = websockets.server.serve(answer, "127.0.0.1", 0, subprotocols=names, process_request=no_file)
+        async with serve as server:
             self.port = server.sockets[0].getsockname()[1]
             self.ready.set()
             await self.end.wait()

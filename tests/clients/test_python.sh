@@ -11,7 +11,8 @@ if ! "$python" -c 'import numpy, websockets' 2>/dev/null; then
     echo "SKIP all: no numpy or websockets for Python (python3-numpy, python3-websockets)"
     exit 77
 fi
-asks() { PYTHONDONTWRITEBYTECODE=1 PYTHONPATH=$tree/clients/python timeout 200 "$python" -W error::RuntimeWarning "$here/ask_python.py" "$@"; }
+export PYTHONDONTWRITEBYTECODE=1 PYTHONPATH="$tree/clients/python"
+asks() { timeout 200 "$python" -W error::RuntimeWarning "$here/ask_python.py" "$@"; }
 
 asks packets "$tree/tests/data/golden"
 check "golden packets and bad bytes" $? == 0

@@ -26,10 +26,10 @@ def read_control(text: str) -> Message:
 
 def whole(message: Message, key: str) -> int:
     """A whole number from 0 below 2^53, which may be written as 4e+09."""
-    value = message.get(key)
-    good = isinstance(value, (int, float)) and not isinstance(value, bool) and 0 <= value < 2**53 and value == int(value)
+    value: Any = message.get(key)
+    good = type(value) in (int, float) and 0 <= value < 2**53 and value == int(value)
     need(good, "JSON", f"a message has no whole number {key}")
-    return int(value)  # type: ignore[arg-type]
+    return int(value)
 
 
 def text_of(message: Message, key: str) -> str:

@@ -26,7 +26,10 @@ class OrderRefused(PalpateError):
 
 
 class Disconnected(PalpateError):
-    """The connection was refused or has ended. code: of the websocket's close (protocol/README.md, "Closing"), 0: none."""
+    """The connection was refused or has ended.
+
+    code: of the websocket's close (protocol/README.md, "Closing"), 0: none.
+    """
 
     def __init__(self, code: int, text: str) -> None:
         super().__init__(text)

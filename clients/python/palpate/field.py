@@ -29,7 +29,10 @@ _HEAD_BYTES = 40
 
 @dataclass(frozen=True)
 class Field:
-    """Values at the vertices of a part. level [n] uint8 in vertex order: 0 is low, 255 high, both in the field's unit."""
+    """Values at the vertices of a part.
+
+    level [n] uint8 in vertex order: 0 is low, 255 high, both in the field's unit.
+    """
 
     part: int
     name: str

@@ -344,7 +344,9 @@ class Session:
 
     def _own(self) -> Tool | None:
         index = self._own_tool
-        return self._tools.tools[index] if self._tools and index is not None and index < len(self._tools.tools) else None
+        if self._tools is None or index is None or index >= len(self._tools.tools):
+            return None
+        return self._tools.tools[index]
 
     def _wait(self, get: Callable[[], T | None], timeout: float, late: str) -> T:
         """What `get` returns once it is not None."""

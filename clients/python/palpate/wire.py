@@ -225,7 +225,8 @@ def read_haptic(data: bytes) -> Haptic:
     finite(origin + forces + g)
     exact(stamp_us, echo_stamp_us)
     need(flags < 8, "FLAGS", f"flags {flags} of a contact model are unknown")
-    need(tool < TOOL_MAX and has_grasp <= 1 and g[12] >= 0, "RANGE", "the tool or grasp of a contact model is impossible")
+    possible = tool < TOOL_MAX and has_grasp <= 1 and g[12] >= 0
+    need(possible, "RANGE", "the tool or grasp of a contact model is impossible")
     grasp = Grasp(_vector(g[:3]), _vector(g[3:6]), _vector(g[6:12]), g[12], _vector(g[13:]))
     return Haptic(
         tool,
