@@ -14,6 +14,7 @@ import threading
 import numpy as np
 import palpate
 import websockets.server
+from palpate import lz4
 
 WAIT_S = 100  # only ends what hangs
 
@@ -162,6 +163,83 @@ class Packets:
                     n_refused += refused(lambda: self.decoder.decode(bad), palpate.WireError) is not None
         need(n_refused > 100, f"{n_refused} refusals")
 
+    def frames_of_every_mode_are_those_of_the_definition(self):
+        random = np.random.default_rng(7)
+        n_group = -(-len(self.asset.rest_m) // 16)
+        seen = set()
+        for _ in range(200):
+            modes = random.integers(0, 16, n_group).tolist()
+            size = self.asset.rest_m.shape
+            residuals = (random.geometric(0.2, size) * random.integers(-3, 4, size)).tolist()
+            raw, kinds = coded(modes, residuals, random)
+            seen |= kinds
+            got = self.decoder.decode(frame_of(len(residuals), raw)).positions_m
+            need((got == self.slow_positions(residuals, 1e-4)).all(), f"modes {modes}")
+        wanted = {(mode, escape) for mode in range(15) for escape in (False, True)}
+        need(wanted <= seen, f"modes and escapes {wanted - seen} were not tried")
+
+    def slow_positions(self, residuals, q):
+        """Positions as protocol/README.md, "FRAME" defines them, vertex by vertex in whole numbers."""
+        x = []
+        out = np.empty((len(residuals), 3), dtype=np.float32)
+        neighbour, weight = self.asset.neighbour.tolist(), self.asset.weight.tolist()
+        for i, (vertex, residual) in enumerate(zip(self.asset.vertex_of.tolist(), residuals, strict=True)):
+            near = [(w, x[nb]) for w, nb in zip(weight[i], neighbour[i], strict=True) if w]
+            x.append([(sum(w * at[c] for w, at in near) + 2048 >> 12) + 16 * residual[c] for c in range(3)])
+            for c in range(3):
+                out[vertex, c] = float(self.asset.rest_m[vertex, c]) + x[i][c] * (float(np.float32(q)) / 16)
+        return out
+
+    def blocks_expand_as_their_format_says(self):
+        end = b"\x50BCDEF"
+        for block, wanted in (
+            (b"\x1fA\1\0\0" + end, b"A" * 20 + b"BCDEF"),  # a match of 15 + 0 + 4 bytes that overlaps itself
+            (b"\x23AB\2\0" + end, b"AB" + b"ABABABA" + b"BCDEF"),
+            (b"\x80ABCDEFGH\7\0" + end, b"ABCDEFGH" + b"BCDE" + b"BCDEF"),
+            (b"\xa0ABCDEFGHIJ\x0f\0" + end, None),  # from before the beginning
+            (b"\x23AB\0\0" + end, None),
+            (b"\x23AB\2", None),
+            (b"", None),
+        ):
+            n = len(wanted) if wanted else 19  # what the first refused one would expand to
+            error = refused(lambda: need(lz4.expand(block, n) == wanted, f"{block!r}"), palpate.WireError)
+            need((error is None) == (wanted is not None), f"{block!r}: {error!r}")
+            need(refused(lambda: lz4.expand(block, n + 1), palpate.WireError), "a byte too few")
+            need(refused(lambda: lz4.expand(block, n - 1), palpate.WireError), "a byte too many")
+
+    def frames_of_impossible_codes_are_refused(self):
+        n = len(self.asset.rest_m)
+        modes = bytes([0xF0] + [0xFF] * ((-(-n // 16) + 1) // 2 - 1))  # group 0 alone has codes, with k = 0
+        ones = 16 * 3 - 1
+        zeros = modes + bits_to_bytes([0] * 13 + [1] * 24 + [1] * ones) + bytes(8)
+        far = modes + bits_to_bytes([0] * 12 + [1] + [0] + [1] * 23 + [1] * ones) + bytes(8)
+        late = modes + bits_to_bytes([1] * 3 * 16) + b"\1" + bytes(8)
+        for raw, code in ((zeros, "COUNT"), (far, "RANGE"), (late, "COUNT"), (modes + bytes(8), "COUNT")):
+            error = refused(lambda: self.decoder.decode(frame_of(n, raw)), palpate.WireError)
+            need(error and error.code == code, f"{error!r} instead of {code}")
+
+    def assets_that_cannot_be_trusted_are_refused(self):
+        data = self.load("asset.bin")
+        n, n_triangle = len(self.asset.rest_m), len(self.asset.triangles)
+        raw = expanded(data[40:])
+        for changes, code in (
+            ({}, None),
+            ({3 * n: 0x7F, 2 * n: 0xFF}, "NAN"),  # a rest position
+            ({12 * n: raw[12 * n] ^ 2}, "ORDER"),  # the vertex of a wire index
+            ({16 * n: 2}, "ORDER"),  # the first vertex has a neighbour
+            ({16 * n + n // 2: 0}, "ORDER"),  # a vertex that is predicted from itself
+            ({32 * n + n // 2: raw[32 * n + n // 2] ^ 1}, "ORDER"),  # a weight
+            ({40 * n + 3 * n_triangle: 1}, "RANGE"),  # a corner
+            ({40 * n + 12 * n_triangle: 1}, "ORDER"),  # the first level
+        ):
+            bad = bytearray(raw)
+            for at, value in changes.items():
+                bad[at] = value
+            block = literals(bytes(bad))
+            file = data[:24] + struct.pack("<II", len(block), fnv1a(block)) + data[32:40] + block
+            error = refused(lambda: palpate.decode_asset(file), palpate.WireError)
+            need((error.code if error else None) == code, f"{changes}: {error!r} instead of {code}")
+
     def control_messages_are_objects_with_a_type(self):
         lines = self.load("control.jsonl").decode().splitlines()
         need([palpate.read_control(line) for line in lines] == [json.loads(line) for line in lines], "numbers")
@@ -201,9 +279,47 @@ def fnv1a(data):
     return value
 
 
-def expanded(block):
-    from palpate import lz4
+def bits_to_bytes(bits):
+    return np.packbits(np.array(bits, dtype=np.uint8), bitorder="little").tobytes()
 
+
+def low_bits(value, n):
+    return [value >> i & 1 for i in range(n)]
+
+
+def coded(modes, residuals, random):
+    """Body of a frame with these modes, and the pairs (mode, has an escape) in it.
+
+    residuals [n][3] in wire order; those that a mode cannot have become 0.
+    """
+    bits, kinds = [], set()
+    for group, mode in enumerate(modes):
+        here = residuals[16 * group : 16 * group + 16]
+        k = mode if mode < 7 else mode - 7
+        if mode == 15:
+            residuals[16 * group : 16 * group + 16] = [[0, 0, 0]] * len(here)
+            continue
+        if mode == 14:
+            k = int(random.integers(0, 16))
+            bits += low_bits(k, 4)
+        elif mode >= 7:
+            bits += [int(any(r)) for r in here]
+        for value in (2 * v if v >= 0 else -2 * v - 1 for r in here if mode < 7 or mode == 14 or any(r) for v in r):
+            escape = value >> k >= 12 or random.random() < 0.01
+            kinds.add((mode, bool(escape)))
+            bits += [0] * 12 + [1] + low_bits(value, 24) if escape else [0] * (value >> k) + [1] + low_bits(value, k)
+    nibbles = [*modes, 0] if len(modes) % 2 else modes
+    pairs = bytes(a | b << 4 for a, b in zip(nibbles[::2], nibbles[1::2], strict=True))
+    return pairs + bits_to_bytes(bits) + bytes(8), kinds
+
+
+def frame_of(n, raw):
+    """A FRAME of part 2 with n vertices, steps of 0.1 mm and this body."""
+    block = literals(raw)
+    return b"PAL1" + struct.pack("<BBHIIQIfIII", 1, 0, 2, 5, 1, 0, 1, 1e-4, n, len(raw), len(block)) + block
+
+
+def expanded(block):
     for n in range(1 << 16):
         try:
             return lz4.expand(block, n)
@@ -396,7 +512,7 @@ def main(part, *args):
     asked = {"packets": Packets, "touch": Touch, "sculpt": Sculpt, "adapt": Adapt}[part](*args)
     n_wrong = 0
     for name, question in vars(type(asked)).items():
-        if name.startswith("__") or name == "load":
+        if name.startswith("__") or name in ("load", "slow_positions"):
             continue
         sentence = name.replace("_", " ")
         try:
