@@ -14,6 +14,12 @@ fi
 export PYTHONDONTWRITEBYTECODE=1 PYTHONPATH="$tree/clients/python"
 asks() { timeout 200 "$python" -W error::RuntimeWarning "$here/ask_python.py" "$@"; }
 
+if "$python" -c 'import mypy' 2>/dev/null; then
+    (cd "$tree/clients/python" && timeout 200 "$python" -m mypy --cache-dir "$work/mypy" palpate examples)
+    check "types are right" $? == 0
+else
+    echo "SKIP types: no mypy (mypy)"
+fi
 asks packets "$tree/tests/data/golden"
 check "golden packets and bad bytes" $? == 0
 make_scene

@@ -25,12 +25,12 @@ from websockets.typing import Subprotocol
 from . import wire
 from .asset import Asset, decode_asset
 from .control import Message, objects, read_control, text_of, whole
-from .errors import Disconnected, OrderRefused, PalpateError, TookTooLong, WireError
+from .errors import Disconnected, OrderRefused, PalpateError, TookTooLong, WireError, need
 from .field import Field, decode_field
 from .frame import Frame, FrameDecoder, epoch_of
 from .planes import U32
 from .topology_delta import decode_topology_delta
-from .wire import Haptic, Pose, Tool, Tools, read_haptic, read_tools, write_ack, write_pose
+from .wire import Haptic, Pose, Tool, Tools, given, read_haptic, read_tools, write_ack, write_pose
 
 _REPEAT_S = 0.05  # period of the repeated pose of a resting tool: the server releases one that is silent for 0.25 s
 _MESSAGE_MAX = 96 << 20  # bytes, as protocol/README.md, "Limits"
@@ -96,7 +96,8 @@ def _get(url: str, path: str) -> bytes:
     address = urllib.parse.urljoin("http" + url[2:], path)
     if urllib.parse.urlsplit(address).netloc != urllib.parse.urlsplit(url).netloc:
         raise PalpateError("an asset is said to be on another server")
-    with urllib.request.urlopen(address, timeout=60) as answer:
+    straight = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # as the websocket
+    with straight.open(address, timeout=60) as answer:
         data: bytes = answer.read(_ASSET_MAX)
     return data
 
@@ -155,7 +156,8 @@ class Session:
         self._ordering = threading.Lock()
         self._socket: websockets.client.WebSocketClientProtocol | None = None
         self._loop = asyncio.new_event_loop()
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._main = self._loop.create_task(self._live())
+        self._tasks: set[asyncio.Task[None]] = set()  # beside it
         self._thread = threading.Thread(target=self._run, name="palpate", daemon=True)
         self._thread.start()
 
@@ -169,10 +171,7 @@ class Session:
 
     def close(self) -> None:
         """Ends the connection and its thread. Waiting methods of other threads raise Disconnected."""
-        try:
-            self._loop.call_soon_threadsafe(self._stop)
-        except RuntimeError:
-            pass  # the loop has ended by itself
+        self._end_soon()
         if threading.current_thread() is not self._thread:
             self._thread.join()
 
@@ -394,7 +393,8 @@ class Session:
                 raise self._error
             if self._own_tool is None:
                 raise PalpateError("this member holds no tool")
-            pose = Pose(self._own_tool, 0, 0, position_m, flags, quaternion, buttons=buttons)
+            at, turn = given("position_m", position_m, 3), given("quaternion", quaternion, 4)  # copies: it is repeated
+            pose = Pose(self._own_tool, 0, 0, at, flags, turn, buttons=buttons)
             data = self._stamped(pose)
             self._pose = pose
             self._send(data)
@@ -414,14 +414,16 @@ class Session:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    def _stop(self) -> None:
-        for task in asyncio.all_tasks(self._loop):
-            task.cancel()
+    def _end_soon(self) -> None:
+        try:
+            self._loop.call_soon_threadsafe(self._main.cancel)
+        except RuntimeError:
+            pass  # the loop has ended by itself
 
     def _run(self) -> None:
         error: PalpateError
         try:
-            self._loop.run_until_complete(self._live())
+            self._loop.run_until_complete(self._main)
             error = Disconnected(0, "the connection has ended")
         except asyncio.CancelledError:
             error = Disconnected(1000, "the session was closed")  # unless the asset's error is there already
@@ -438,15 +440,17 @@ class Session:
         with self._changed:
             self._error = self._error or error
             self._changed.notify_all()
-        self._stop()
-        self._loop.run_until_complete(self._end())
         self._loop.close()
 
-    async def _end(self) -> None:
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-        await self._loop.shutdown_default_executor()
-
     async def _live(self) -> None:
+        try:
+            await self._connect()
+        finally:
+            for task in self._tasks:
+                task.cancel()
+            await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    async def _connect(self) -> None:
         names = [Subprotocol(wire.PROTOCOL)] + ([Subprotocol("ticket." + self._ticket)] if self._ticket else [])
         async with websockets.client.connect(
             self._url, subprotocols=names, compression=None, max_size=_MESSAGE_MAX, open_timeout=10, close_timeout=2
@@ -469,15 +473,11 @@ class Session:
             if data:
                 await self._write(data)
 
-    async def _load(self, index: int, part: _Part, path: str) -> None:
-        """Fetches and decodes the asset of a part, then what came before it."""
-
-        def load() -> tuple[Asset, FrameDecoder]:
-            asset = decode_asset(_get(self._url, path))
-            return asset, FrameDecoder(asset)
-
+    def _load(self, index: int, part: _Part, path: str) -> None:
+        """Fetches and decodes the asset of a part, then what came before it; in a thread of its own."""
         try:
-            asset, decoder = await self._loop.run_in_executor(None, load)
+            asset = decode_asset(_get(self._url, path))
+            decoder = FrameDecoder(asset)
             with self._changed:
                 part.asset, part.decoder, part.table = asset, decoder, asset.triangles.copy()
                 for data in part.early_deltas:
@@ -488,9 +488,9 @@ class Session:
             with self._changed:
                 if part not in self._parts:
                     return  # replaced meanwhile: its file may be gone
-                self._error = PalpateError(f"the asset of part {index} is not loaded: {error}")
+                self._error = self._error or PalpateError(f"the asset of part {index} is not loaded: {error}")
                 self._changed.notify_all()
-            self._stop()
+            self._end_soon()
 
     # messages, under the lock
 
@@ -519,6 +519,8 @@ class Session:
         elif kind == wire.FIELD:
             part.field = data
         elif part.asset is None or part.table is None:
+            n_byte = len(data) + sum(map(len, part.early_deltas))
+            need(n_byte <= _MESSAGE_MAX, "COUNT", "too many changes of triangles have come before their asset")
             part.early_deltas.append(data)
         else:
             delta = decode_topology_delta(data, len(part.table), len(part.asset.rest_m))
@@ -565,5 +567,7 @@ class Session:
                 parts.append(old)
                 continue
             parts.append(_Part(info, epoch))
-            self._spawn(self._load(index, parts[-1], path))
+            # nobody waits for it: the thread of a server that sends no more ends with the program
+            load = threading.Thread(target=self._load, args=(index, parts[-1], path), name="palpate asset", daemon=True)
+            load.start()
         self._parts = parts

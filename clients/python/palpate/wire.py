@@ -268,8 +268,8 @@ class Pose:
     model_stamp_us: int = 0
 
 
-def _given(name: str, value: ArrayLike, n: int) -> list[float]:
-    """n finite numbers of the caller."""
+def given(name: str, value: ArrayLike, n: int) -> list[float]:
+    """A copy of n finite numbers of the caller."""
     try:
         out = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -281,11 +281,11 @@ def _given(name: str, value: ArrayLike, n: int) -> list[float]:
 
 def write_pose(pose: Pose) -> bytes:
     """The POSE message, 152 bytes; PalpateError when a number has no place in it."""
-    floats: list[Any] = _given("position_m", pose.position_m, 3) + _given("quaternion", pose.quaternion, 4)
+    floats: list[Any] = given("position_m", pose.position_m, 3) + given("quaternion", pose.quaternion, 4)
     if max(abs(x) for x in floats[:3]) > 1000 or abs(sum(q * q for q in floats[3:]) - 1) > 1e-3:
         raise PalpateError("a pose is farther than 1000 m away, or its quaternion is not of length 1")
     for name in ("velocity_m_s", "omega_rad_s", "force_N", "torque_N_m"):
-        floats += _given(name, getattr(pose, name), 3)
+        floats += given(name, getattr(pose, name), 3)
     head = (MAGIC, POSE, 0, pose.tool, pose.seq, pose.flags, pose.stamp_us)
     tail = (pose.opening, pose.buttons, pose.model_seq, pose.model_age_us, pose.model_stamp_us)
     try:
