@@ -1,6 +1,6 @@
 """What clients/python answers: to golden packets and bad bytes, and beside a real server.
 
-usage: ask_python.py packets FOLDER | touch URL | sculpt URL TICKET | adapt URL
+usage: ask_python.py packets FOLDER | touch URL | sculpt URL KEYS TICKET | adapt URL
 Prints a line for each question; exit code 1 when an answer is wrong.
 """
 
@@ -9,6 +9,7 @@ import json
 import pathlib
 import struct
 import sys
+import tempfile
 import threading
 
 import numpy as np
@@ -255,11 +256,91 @@ class Packets:
             ([alone, "no message"], "a text message is not JSON"),
             ([alone, '{"type":"topology","parts":1}'], "parts of a message is no list of objects"),
             (['{"type":"hello"}'], "a hello does not say who this member is"),
-            ([hello], "the asset of part"),
+            ([hello], "an asset of part liver"),
         ):
             with fake_server(messages) as url:
                 error = refused(lambda: palpate.join(url, timeout=WAIT_S).tools(timeout=WAIT_S))
             need(error and text in str(error), f"{error!r} instead of {text}")
+
+    def an_order_of_a_lost_connection_is_told_and_the_session_goes_on(self):
+        hello = json.loads(self.load("control.jsonl").decode().splitlines()[0])
+        with fake_server([json.dumps({**hello, "parts": []})]) as url:  # which goes away at an order
+            for reconnect, joins in ((True, [2, 3]), (False, [1, 1])):
+                with palpate.join(url, reconnect=reconnect, timeout=WAIT_S) as session:
+                    for n_join in joins:
+                        error = refused(lambda: session.order("pause", timeout=WAIT_S), palpate.Disconnected)
+                        need(error and error.code == 1001, f"{error!r}")
+                        if reconnect:
+                            need("before pause was answered" in str(error), str(error))
+                            session._wait(lambda: session._joined or None, WAIT_S, "not joined again")
+                        need(session.joins == n_join, f"{session.joins} joins")
+
+    def interiors_are_those_of_the_definition(self):
+        random = np.random.default_rng(5)
+        n, q = 50, np.float32(1e-4)
+        steps = random.integers(-32768, 32768, (n, 3))
+        level = random.integers(0, 256, n).astype(np.uint8)
+        planes = b""
+        for axis in steps.T.tolist():
+            differences = [(b - a + 32768) % 65536 - 32768 for a, b in zip([0, *axis], axis, strict=False)]
+            folded = [(d << 1 ^ d >> 15) & 0xFFFF for d in differences]
+            planes += bytes(v & 255 for v in folded) + bytes(v >> 8 for v in folded)
+        block = literals(planes + level.tobytes())
+        head = b"PAL1" + struct.pack("<BBHIIQfffII", 6, 0, 3, 9, 2, 77, -1, 4, q, n, len(block))
+        got = palpate.decode_interior(head + block, n)
+        whole = (got.part, got.epoch, got.name, got.sim_time_us, got.low, got.high)
+        need(whole == (3, 9, "von_mises", 77, -1, 4), f"{whole}")
+        need((got.displacement_m == f32(steps * np.float64(q))).all() and (got.level == level).all(), "numbers")
+        need(got.values[0] == -1 + 5 * level[0] / 255, "values")
+        n_refused = 0
+        for at in range(44):
+            for value in (0, 255):
+                bad = head[:at] + bytes([value]) + head[at + 1 :] + block
+                n_refused += refused(lambda: palpate.decode_interior(bad, n), palpate.WireError) is not None
+        need(n_refused > 30, f"{n_refused} refusals")
+        for length in (*range(44), 50, len(head + block) - 1):
+            need(refused(lambda: palpate.decode_interior((head + block)[:length], n), palpate.WireError), str(length))
+        faces = np.array([[0, 1, 2], [2, 1, 3]], dtype=np.uint32)
+        need(palpate.tetrahedra_of(faces).tolist() == [[0, 1, 2, 3]], "tetrahedra")
+        for odd in (faces[:1], faces[:, ::-1]):
+            need(refused(lambda: palpate.tetrahedra_of(odd), palpate.WireError), "no pairs")
+
+    def tickets_are_those_of_the_server(self):
+        key = bytes(range(32))  # this and the text: tests/protocol/test_ticket.c
+        text = "AQcBAgMA669IqXJXleoqAAAAANJJa-_Nq4lnRSMBUEp1D5O_J5qG5TAA6x2ZvY3J_OddOK28FYjZT453Q5o"
+        ticket = palpate.Ticket(
+            "trainee", 2, 3, palpate.ticket_session("liver"), 42, 1800000000, nonce=0x0123456789ABCDEF
+        )
+        need(palpate.write_ticket(ticket, 7, key) == text, "text")
+        need(palpate.read_ticket(text, {1: bytes(32), 7: key}) == ticket, "numbers")
+        need(palpate.ticket_session("") == 0, "any session")
+        for bad, keys in ((text, {1: key}), (text, {7: bytes(32)}), (text[:-1], {7: key}), (text + "A", {7: key}),
+                          ("+" + text[1:], {7: key}), ("", {7: key}), ("\u00e9" * 83, {7: key})):  # fmt: skip
+            need(refused(lambda: palpate.read_ticket(bad, keys)), bad)
+        for wrong in ({"role": "surgeon"}, {"tool": 32}, {"uses": 65536}, {"expires_s": -1}):
+            need(refused(lambda: palpate.write_ticket(palpate.Ticket(**wrong), 7, key)), str(wrong))
+        need(refused(lambda: palpate.write_ticket(ticket, 7, b"short")), "a short key")
+
+    def key_files_are_read_as_by_the_server(self):
+        digits = bytes(range(32)).hex()
+        with tempfile.NamedTemporaryFile("w") as file:
+            for text, ids in (
+                (f"# keys\n\n2 {digits}\n9 {digits.upper()}\n", [2, 9]),
+                ("# nothing\n", None),
+                (f"0 {digits}\n", None),
+                (f"256 {digits}\n", None),
+                (f"2 {digits[2:]}\n", None),
+                (f"2 {digits}\n2 {digits}\n", None),
+                ("2\n", None),
+            ):
+                file.seek(0)
+                file.truncate()
+                file.write(text)
+                file.flush()
+                error = refused(lambda: need(list(palpate.read_keys(file.name)) == ids, text))
+                need((error is None) == (ids is not None), f"{text!r}: {error!r}")
+            pathlib.Path(file.name).chmod(0o644)
+            need("others" in str(refused(lambda: palpate.read_keys(file.name))), "who may read it")
 
     def what_a_caller_gives_wrongly_is_told(self):
         for position in ([0, 0], [0, 0, "x"], [0, 0, float("nan")], [0, 0, 1001]):
@@ -352,7 +433,9 @@ class fake_server:
             await socket.recv()
             for message in self.messages:
                 await socket.send(message)
-            await socket.wait_closed()
+            async for heard in socket:
+                if '"command"' in heard:
+                    await socket.close(1001, "away")
 
         self.end = asyncio.Event()
         def no_file(path, headers):
@@ -373,6 +456,40 @@ class fake_server:
     def __exit__(self, *error):
         self.loop.call_soon_threadsafe(self.end.set)
         self.thread.join()
+
+
+class Proxy:
+    """Passes on the bytes of connections to a server, until they are cut."""
+
+    def __init__(self, port):
+        self.server_port = port
+        self.loop = asyncio.new_event_loop()
+        self.server = self.loop.run_until_complete(asyncio.start_server(self.serve, "127.0.0.1", 0))
+        self.port = self.server.sockets[0].getsockname()[1]
+        self.writers = set()
+        threading.Thread(target=self.loop.run_forever, daemon=True).start()
+
+    async def serve(self, reader, writer):
+        there_reader, there_writer = await asyncio.open_connection("127.0.0.1", self.server_port)
+        self.writers |= {writer, there_writer}
+        await asyncio.gather(self.copy(reader, there_writer), self.copy(there_reader, writer))
+
+    async def copy(self, reader, writer):
+        try:
+            while data := await reader.read(65536):
+                writer.write(data)
+                await writer.drain()
+        except OSError:
+            pass  # cut
+        writer.close()
+
+    def cut(self):
+        def now():
+            for writer in self.writers:
+                writer.transport.abort()
+            self.writers.clear()
+
+        self.loop.call_soon_threadsafe(now)
 
 
 def climb(session, top_m, up, from_m, to_m, grasp):
@@ -400,6 +517,7 @@ class Touch:
     """A ball of 40 mm, for everybody."""
 
     def __init__(self, url):
+        self.url = url
         self.session = palpate.join(url, name="Ada", timeout=WAIT_S)
 
     def who_joins_is_told_what_is_there(self):
@@ -434,6 +552,29 @@ class Touch:
         need(field.name == "displacement" and field.values.shape == (len(s.asset().rest_m),), "shape")
         need(0.005 < field.high < 0.015, f"{field.high} m")
 
+    def what_is_inside_comes_with_its_field(self):
+        s = self.session
+        s.subscribe_field(0, "displacement", interior=True)
+        nodes = s.interior_asset(timeout=WAIT_S)
+        tets = palpate.tetrahedra_of(nodes.triangles)
+        a, b, c, d = (nodes.rest_m[tets[:, i]].astype(float) for i in range(4))
+        volume = np.abs(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a)).sum() / 6
+        # cells of 80 mm / 6 that touch the ball of 40 mm
+        least, most = (4 / 3 * np.pi * r**3 for r in (0.039, 0.04 + 3**0.5 * 0.08 / 6))
+        need(least < volume < most, f"{volume} m3, not from {least} to {most}")
+        inside = None
+        for _ in range(500):  # the pulled ball comes to rest: values are up to a frame older than displacements
+            inside = s.interior(after=inside, timeout=WAIT_S)
+            length = np.linalg.norm(inside.displacement_m, axis=1)
+            off = np.abs(length - inside.values).max()
+            bound = (inside.high - inside.low) / 510 + np.sqrt(3) / 2 * inside.q_m
+            if off <= 1.01 * bound:
+                break
+        need(inside.name == "displacement" and len(inside.level) == len(nodes.rest_m), "shape")
+        need(0.005 < length.max() < 0.015, f"the top has moved by {length.max()} m")
+        need(off <= 1.01 * bound, f"{off} m between displacements and their lengths, at most {bound}")
+        s.subscribe_field(0, "none")
+
     def a_resting_tool_stays_where_it_was_put(self):
         s = self.session
         at = np.array([0.0, 0.0, 0.1])
@@ -442,6 +583,27 @@ class Touch:
         at += 0.01  # the caller's array is its own
         shown = s.tools(after=pose + 3, timeout=WAIT_S).tools[s.tool]  # of a repeated pose
         need((f32(shown.position_m) == f32([0.0, 0.0, 0.1])).all(), f"{shown.position_m}")
+
+    def the_list_of_sessions_names_this_one(self):
+        (found,) = palpate.sessions(self.url, timeout=WAIT_S)
+        need((found["name"], found["title"], found["members"]) == ("ball", "Ball", 1), f"{found}")
+        error = refused(lambda: palpate.open_session(self.url, "ball.json", timeout=WAIT_S))
+        need(error and "--scenes" in str(error), f"{error!r}")
+        need(refused(lambda: palpate.sessions("http://127.0.0.1:1", timeout=WAIT_S)), "nobody is there")
+
+    def a_lost_connection_comes_back_with_its_tool(self):
+        proxy = Proxy(int(self.url.split(":")[2].split("/")[0]))
+        with palpate.join(f"http://127.0.0.1:{proxy.port}", tool=2, timeout=WAIT_S) as s:
+            s.subscribe_field(0, "displacement")
+            s.field(timeout=WAIT_S)
+            s.force_N(after=s.move([0, 0, 0.1]), timeout=WAIT_S)
+            proxy.cut()
+            s._wait(lambda: s._n_join == 2 or None, WAIT_S, "not joined again")
+            pose = s.move([0, 0, 0.1], timeout=WAIT_S)
+            need(s.tool == 2 and s.joins == 2, f"tool {s.tool}")
+            need((s.force_N(after=pose, timeout=WAIT_S) == 0).all(), "force in the air")
+            need(s.frame(timeout=WAIT_S).positions_m.shape == s.asset().rest_m.shape, "frame")
+            need(s.field(timeout=WAIT_S).name == "displacement", "field")
 
     def orders_are_answered_or_refused(self):
         s = self.session
@@ -466,8 +628,12 @@ class Touch:
 class Sculpt:
     """A block of control cells, for who has a ticket."""
 
-    def __init__(self, url, ticket):
-        self.url, self.ticket = url, ticket
+    def __init__(self, url, keys, ticket):
+        self.url = url
+        self.keys = palpate.read_keys(keys)
+        self.made = palpate.read_ticket(ticket, self.keys)
+        key_id = list(self.keys)[-1]
+        self.ticket = palpate.write_ticket(palpate.Ticket("instructor", uses=0), key_id, self.keys[key_id])
 
     def who_has_no_ticket_watches(self):
         with palpate.join(self.url, timeout=WAIT_S) as s:
@@ -475,6 +641,29 @@ class Sculpt:
             need("holds no tool" in str(refused(lambda: s.move([0, 0, 0]))), "tool")
         error = refused(lambda: palpate.join(self.url, ticket="A" * 83, timeout=WAIT_S), palpate.Disconnected)
         need(error and error.code == 1008, f"{error!r}")
+
+    def a_ticket_that_the_program_made_is_read(self):
+        t = self.made
+        need((t.role, t.tool, t.uses, t.user) == ("viewer", -2, 5, 9), f"{t}")
+        need(t.session == palpate.ticket_session("block") and t.expires_s > 1700000000, f"{t}")
+
+    def an_instructor_opens_and_ends_a_session(self):
+        error = refused(lambda: palpate.open_session(self.url, "ball.json", timeout=WAIT_S))
+        need(error and "only instructors" in str(error), f"{error!r}")
+        name = palpate.open_session(self.url, "ball.json", ticket=self.ticket, timeout=WAIT_S)
+        while (state := self.state(name)) == "opening":
+            pass
+        need(state == "running", f"{state}")
+        with palpate.join(f"{self.url}?session={name}#{self.ticket}", timeout=WAIT_S) as s:
+            need(s.hello["session"] == name, "the wanted session")
+            palpate.end_session(self.url, name, ticket=self.ticket, timeout=WAIT_S)
+            error = refused(lambda: s._wait(lambda: None, WAIT_S, "not ended"), palpate.Disconnected)
+            need(error and error.code == 4004, f"{error!r}")
+        need(self.state(name) is None, "no longer in the list")
+
+    def state(self, name):
+        found = palpate.sessions(self.url, ticket=self.ticket, timeout=WAIT_S)
+        return next((session["state"] for session in found if session["name"] == name), None)
 
     def an_edit_is_answered_and_gives_another_shape(self):
         with palpate.join(f"{self.url}#{self.ticket}", role="instructor", tool=None, timeout=WAIT_S) as s:
@@ -524,7 +713,7 @@ def main(part, *args):
     fallen = []  # threads that ended by an error
     threading.excepthook = lambda args: fallen.append(repr(args.exc_value))
     for name, question in vars(type(asked)).items():
-        if name.startswith("__") or name in ("load", "slow_positions"):
+        if name.startswith("__") or name in ("load", "slow_positions", "state"):
             continue
         sentence = name.replace("_", " ")
         try:

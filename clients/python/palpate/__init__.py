@@ -17,8 +17,11 @@ from .control import read_control
 from .errors import Disconnected, OrderRefused, PalpateError, TookTooLong, WireError
 from .field import FIELD_NAMES, Field, decode_field
 from .frame import Frame, FrameDecoder
+from .interior import Interior, decode_interior, tetrahedra_of
 from .session import Answer, Session, join
+from .ticket import Ticket, read_keys, read_ticket, ticket_session, write_ticket
 from .topology_delta import TopologyDelta, decode_topology_delta
+from .web import end_session, open_session, sessions
 from .wire import ContactPatch, Grasp, Haptic, Pose, Tool, Tools, read_haptic, read_tools, write_ack, write_pose
 
 __all__ = [
@@ -32,10 +35,12 @@ __all__ = [
     "FrameDecoder",
     "Grasp",
     "Haptic",
+    "Interior",
     "OrderRefused",
     "PalpateError",
     "Pose",
     "Session",
+    "Ticket",
     "TookTooLong",
     "Tool",
     "Tools",
@@ -43,11 +48,20 @@ __all__ = [
     "WireError",
     "decode_asset",
     "decode_field",
+    "decode_interior",
     "decode_topology_delta",
+    "end_session",
     "join",
+    "open_session",
     "read_control",
     "read_haptic",
+    "read_keys",
+    "read_ticket",
     "read_tools",
+    "sessions",
+    "tetrahedra_of",
+    "ticket_session",
     "write_ack",
     "write_pose",
+    "write_ticket",
 ]

@@ -1,16 +1,14 @@
-"""A joined session. A thread of the package receives, acknowledges and repeats poses; every method may be called from
-any thread and waits at most its timeout. Frames and fields are decoded by the method that asks for them, so that a
-script that reads forces alone decodes none."""
+"""A joined session. A thread of the package receives, acknowledges, repeats poses and joins again after a loss; every
+method may be called from any thread and waits at most its timeout. Frames and fields are decoded by the method that
+asks for them, so that a script that reads forces alone decodes none."""
 
 import asyncio
 import dataclasses
 import http.client
 import json
-import os
 import threading
 import time
-import urllib.parse
-import urllib.request
+import urllib.error
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
@@ -28,13 +26,19 @@ from .control import Message, objects, read_control, text_of, whole
 from .errors import Disconnected, OrderRefused, PalpateError, TookTooLong, WireError, need
 from .field import Field, decode_field
 from .frame import Frame, FrameDecoder, epoch_of
+from .interior import Interior, decode_interior, tetrahedra_of
 from .planes import U32
 from .topology_delta import decode_topology_delta
+from .web import address_of, get
 from .wire import Haptic, Pose, Tool, Tools, given, read_haptic, read_tools, write_ack, write_pose
 
 _REPEAT_S = 0.05  # period of the repeated pose of a resting tool: the server releases one that is silent for 0.25 s
 _MESSAGE_MAX = 96 << 20  # bytes, as protocol/README.md, "Limits"
 _ASSET_MAX = 257 << 20  # bytes
+_ASSET_S = 60.0  # in which the server must go on sending an asset
+_PAUSE_FIRST_S, _PAUSE_MAX_S = 0.25, 5.0  # before joining again; each is twice the one before
+# closures after which a client joins again (protocol/README.md, "Closing"); 0, 1005, 1006: without a code
+_MAY_RETURN = frozenset((0, 1000, 1001, 1005, 1006, 1011, 4002, 4003))
 # orders that end with an `answer`; the others are done, or refused, before the `pong` of a ping behind them
 _ANSWERED = frozenset(
     "seek branch study_point configure delete divide extrude merge bridge sharpen paint set_rest_shape cut uncut "
@@ -54,17 +58,29 @@ class Answer:
     numbers: dict[str, float]
 
 
+@dataclass(frozen=True)
+class _Loaded:
+    """An asset and the decoder of its frames; the path names the content, so it may be used again."""
+
+    path: str
+    asset: Asset
+    decoder: FrameDecoder
+
+
 @dataclass(eq=False)
 class _Part:
-    """One part and its newest messages. Those of frame and field are decoded when they are asked for."""
+    """One part and its newest messages. Those of frame, field and interior are decoded when they are asked for."""
 
     info: Message
     epoch: int
-    asset: Asset | None = None
-    decoder: FrameDecoder | None = None
+    path: str
+    loaded: _Loaded | None = None
     table: U32 | None = None
+    inside: Asset | None = None
+    asked_inside: bool = False
     frame: bytes | None = None
     field: bytes | None = None
+    interior: bytes | None = None
     early_deltas: list[bytes] = dataclasses.field(default_factory=list)  # came before the asset
 
 
@@ -72,34 +88,12 @@ class _Part:
 class _Order:
     verb: str
     answer: Answer | None = None
-    error: OrderRefused | None = None
-
-
-def _address(url: str, ticket: str | None) -> tuple[str, str]:
-    """Address of the websocket and ticket."""
-    at = urllib.parse.urlsplit(url)
-    scheme = {"http": "ws", "https": "wss"}.get(at.scheme, at.scheme)
-    if scheme not in ("ws", "wss") or not at.netloc:
-        raise PalpateError(f"{url} is no address such as ws://127.0.0.1:8090/ws")
-    path = at.path if at.path not in ("", "/") else "/ws"
-    given = ticket or at.fragment or os.environ.get("PALPATE_TICKET", "")
-    return urllib.parse.urlunsplit((scheme, at.netloc, path, at.query, "")), given
+    error: PalpateError | None = None
 
 
 def _number(data: bytes, at: int, n_byte: int) -> int:
     """A whole number of a message, before it is decoded."""
     return int.from_bytes(data[at : at + n_byte], "little")
-
-
-def _get(url: str, path: str) -> bytes:
-    """A file of the server of this websocket address."""
-    address = urllib.parse.urljoin("http" + url[2:], path)
-    if urllib.parse.urlsplit(address).netloc != urllib.parse.urlsplit(url).netloc:
-        raise PalpateError("an asset is said to be on another server")
-    straight = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # as the websocket
-    with straight.open(address, timeout=60) as answer:
-        data: bytes = answer.read(_ASSET_MAX)
-    return data
 
 
 def join(
@@ -109,24 +103,26 @@ def join(
     role: str = "trainee",
     tool: int | None = -1,
     ticket: str | None = None,
+    reconnect: bool = True,
     timeout: float = 10.0,
 ) -> "Session":
     """Joins the session at `url` and returns it once the server has said hello.
 
     url: ws[s]:// or http[s]://host[:port][/path][?session=NAME][#TICKET], as the server prints it; default path /ws.
     role: viewer, trainee or instructor. tool: index of the wanted tool, -1 any free one, None none; a viewer gets none.
-    ticket: else that of the url, else that of the environment variable PALPATE_TICKET. timeout: s. Raises Disconnected
-    with the server's reason, or TookTooLong.
+    ticket: else that of the url, else that of the environment variable PALPATE_TICKET. reconnect: join again after a
+    lost connection, with the tool that was held, the last pose and the subscriptions, until close() or a refusal.
+    timeout: s. Raises Disconnected with the server's reason, or TookTooLong.
     """
     if role not in ("viewer", "trainee", "instructor"):
         raise PalpateError(f"{role} is no role: viewer, trainee or instructor")
-    address, given = _address(url, ticket)
+    address, offered = address_of(url, ticket)
     wanted: Message = {"type": "join", "name": name, "role": role, "topology_deltas": True}
     if tool is not None and role != "viewer":
         wanted["tool"] = tool
-    session = Session(address, given, wanted)
+    session = Session(address, offered, wanted, reconnect)
     try:
-        session._wait(lambda: session._hello, timeout, "the server has not said hello")
+        session._wait(lambda: session._joined or None, timeout, "the server has not said hello")
     except PalpateError:
         session.close()
         raise
@@ -136,11 +132,15 @@ def join(
 class Session:
     """A joined session, made by join(). A context manager: leaving it closes the connection."""
 
-    def __init__(self, url: str, ticket: str, wanted: Message) -> None:
-        self._url, self._ticket, self._wanted = url, ticket, wanted
+    def __init__(self, url: str, ticket: str, wanted: Message, reconnect: bool) -> None:
+        self._url, self._ticket, self._wanted, self._reconnect = url, ticket, wanted, reconnect
         self._changed = threading.Condition()
         self._error: PalpateError | None = None
-        self._hello: Message | None = None
+        self._hello: Message | None = None  # of this connection or an earlier one
+        self._joined = False  # hello has come on this connection
+        self._n_join = 0
+        self._lost = ""  # why there is no connection
+        self._subscribed: dict[int, Message] = {}  # by part
         self._status: Message | None = None
         self._members: list[Message] = []
         self._id = 0
@@ -184,6 +184,12 @@ class Session:
         return self._hello
 
     @property
+    def joins(self) -> int:
+        """How often the session was joined: 1, and one more after each lost connection."""
+        with self._changed:
+            return self._n_join
+
+    @property
     def members(self) -> list[Message]:
         """Who is here: id, role, name, tool, rights."""
         with self._changed:
@@ -209,7 +215,7 @@ class Session:
 
     def asset(self, part: int = 0, timeout: float = 60.0) -> Asset:
         """Rest shape and triangles of a part; loaded in the background after join and after each new epoch."""
-        return self._wait(lambda: self._part(part).asset, timeout, f"the asset of part {part} has not come")
+        return self._wait(lambda: self._part(part).loaded, timeout, f"the asset of part {part} has not come").asset
 
     def triangles(self, part: int = 0, timeout: float = 60.0) -> U32:
         """The present triangles of a part, [t][3], a copy; without the empty slots of an adaptive part."""
@@ -225,17 +231,29 @@ class Session:
 
         def newest() -> tuple[FrameDecoder, bytes] | None:
             found = self._part(part)
-            old = after and (after.epoch, after.seq)
-            if found.decoder is None or found.frame is None or (found.epoch, _number(found.frame, 12, 4)) == old:
+            if found.loaded is None or found.frame is None:
                 return None
-            return found.decoder, found.frame
+            moment = (found.epoch, _number(found.frame, 12, 4), _number(found.frame, 16, 8))
+            if after and moment == (after.epoch, after.seq, after.sim_time_us):
+                return None
+            return found.loaded.decoder, found.frame
 
         decoder, data = self._wait(newest, timeout, f"no newer frame of part {part} has come")
         return decoder.decode(data)
 
-    def subscribe_field(self, part: int, field: str) -> None:
-        """Asks for a field of a part, one of its `fields`; "none" ends it."""
-        self._send({"type": "subscribe_field", "part": part, "field": field})
+    def subscribe_field(self, part: int, field: str, interior: bool = False) -> None:
+        """Asks for a field of a part, one of its `fields`; "none" ends it. interior: its values and displacements at
+        the nodes inside too, if the part has an `interior`."""
+        message: Message = {"type": "subscribe_field", "part": part, "field": field}
+        if interior:
+            message["interior"] = True
+        with self._changed:
+            found = self._part(part)
+            if interior and "interior" not in found.info:
+                raise PalpateError(f"part {part} has no interior")
+            self._subscribed[part] = message
+            self._load_inside(found, message)
+            self._send(message)
 
     def field(self, part: int = 0, after: Field | None = None, timeout: float = 60.0) -> Field:
         """The newest values of the subscribed field; with `after` those of another time. A part at rest has no newer
@@ -244,12 +262,30 @@ class Session:
         def newest() -> tuple[bytes, int] | None:
             found = self._part(part)
             old = after and (after.epoch, after.sim_time_us)
-            if found.asset is None or found.field is None or (found.epoch, _number(found.field, 16, 8)) == old:
+            if found.loaded is None or found.field is None or (found.epoch, _number(found.field, 16, 8)) == old:
                 return None
-            return found.field, len(found.asset.rest_m)
+            return found.field, len(found.loaded.asset.rest_m)
 
         data, n_vertex = self._wait(newest, timeout, f"no newer field of part {part} has come")
         return decode_field(data, n_vertex)
+
+    def interior_asset(self, part: int = 0, timeout: float = 60.0) -> Asset:
+        """Nodes at rest inside a part whose interior is subscribed, and in tetrahedra_of(asset.triangles) the
+        tetrahedra between them."""
+        return self._wait(lambda: self._part(part).inside, timeout, f"the interior of part {part} has not come")
+
+    def interior(self, part: int = 0, after: Interior | None = None, timeout: float = 60.0) -> Interior:
+        """The newest displacements and values inside a part whose interior is subscribed; `after` as for field()."""
+
+        def newest() -> tuple[bytes, int] | None:
+            found = self._part(part)
+            old = after and (after.epoch, after.sim_time_us)
+            if found.inside is None or found.interior is None or (found.epoch, _number(found.interior, 16, 8)) == old:
+                return None
+            return found.interior, len(found.inside.rest_m)
+
+        data, n_node = self._wait(newest, timeout, f"no newer interior of part {part} has come")
+        return decode_interior(data, n_node)
 
     # the own tool
 
@@ -261,20 +297,27 @@ class Session:
         self._answered(_Order("take_tool"), {"type": "take_tool", "tool": tool}, timeout)
         self._wait(lambda: self._own_tool == tool or None, timeout, f"tool {tool} was not given")
 
-    def move(self, position_m: ArrayLike, grasp: bool = False, quaternion: ArrayLike = (1.0, 0.0, 0.0, 0.0)) -> int:
+    def move(
+        self,
+        position_m: ArrayLike,
+        grasp: bool = False,
+        quaternion: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+        timeout: float = 10.0,
+    ) -> int:
         """Moves the own tool and returns the number of the pose, for force_N and tools.
 
         position_m [3]: of the tip, scene frame. grasp: closed; it holds what it touches when it closes. quaternion
         [4]: w x y z, 1 0 0 0 unknown. The pose is repeated until the next one, or lift(). A tool faster than 5 m/s, or
-        20 sizes of the body a second, is lifted by the server: move it in steps.
+        20 sizes of the body a second, is lifted by the server: move it in steps. timeout: s, for a lost connection to
+        come back.
         """
-        return self._put_pose(position_m, quaternion, wire.GRASP if grasp else 0, wire.POSE_ONLY)
+        return self._put_pose(position_m, quaternion, wire.GRASP if grasp else 0, wire.POSE_ONLY, timeout)
 
-    def lift(self) -> int:
+    def lift(self, timeout: float = 10.0) -> int:
         """Lifts the own tool out of the scene until the next move()."""
         with self._changed:
             at = self._pose.position_m if self._pose else (0.0, 0.0, 0.0)
-        return self._put_pose(at, (1.0, 0.0, 0.0, 0.0), 0, wire.POSE_ONLY | wire.AWAY)
+        return self._put_pose(at, (1.0, 0.0, 0.0, 0.0), 0, wire.POSE_ONLY | wire.AWAY, timeout)
 
     def tools(self, after: int = 0, timeout: float = 10.0) -> Tools:
         """The newest state of all tools; with `after`, the number of an own pose, one of a step that has used it or a
@@ -308,7 +351,8 @@ class Session:
 
         verb, target and numbers: protocol/README.md, "Commands", and `palpate serve --help-protocol`, with units in
         the names: order("material", "liver", young_Pa=8000). Edits, probe, cut, configure, seek and branch return when
-        they are done; the others when they are accepted, with an empty answer. timeout: s.
+        they are done; the others when they are accepted, with an empty answer. timeout: s. Disconnected when the
+        connection is lost meanwhile: whether the order was carried out is then unknown.
         """
         message = {"type": "command", "verb": verb, "target": target, "args": numbers}
         return self._answered(_Order(verb), message, timeout)
@@ -321,13 +365,17 @@ class Session:
                 return Answer(order.verb, "", {})
             return order.answer
 
-        with self._ordering:
-            with self._changed:
-                self._order = order
-                self._ping += 1
-                ping = self._ping
+        def begin() -> int | None:
+            if not self._joined:
+                return None
+            self._order = order
+            self._ping += 1
             self._send(message)
-            self._send({"type": "ping", "stamp_ms": ping})
+            self._send({"type": "ping", "stamp_ms": self._ping})
+            return self._ping
+
+        with self._ordering:
+            ping = self._wait(begin, timeout, f"{order.verb} was not sent")
             try:
                 return self._wait(ended, timeout, f"{order.verb} was not answered")
             finally:
@@ -356,7 +404,8 @@ class Session:
                     raise self._error
                 left = end - time.monotonic()
                 if left <= 0:
-                    raise TookTooLong(f"{late} within {timeout:g} s")
+                    why = "" if self._joined or not self._lost else f": {self._lost}"
+                    raise TookTooLong(f"{late} within {timeout:g} s{why}")
                 self._changed.wait(left)
             return found
 
@@ -387,18 +436,23 @@ class Session:
         except websockets.exceptions.ConnectionClosed:
             pass  # reported by the receiving side
 
-    def _put_pose(self, position_m: ArrayLike, quaternion: ArrayLike, buttons: int, flags: int) -> int:
-        with self._changed:
-            if self._error:
-                raise self._error
+    def _put_pose(
+        self, position_m: ArrayLike, quaternion: ArrayLike, buttons: int, flags: int, timeout: float
+    ) -> int:
+        at, turn = given("position_m", position_m, 3), given("quaternion", quaternion, 4)  # copies: it is repeated
+
+        def put() -> int | None:
+            if not self._joined:
+                return None
             if self._own_tool is None:
                 raise PalpateError("this member holds no tool")
-            at, turn = given("position_m", position_m, 3), given("quaternion", quaternion, 4)  # copies: it is repeated
             pose = Pose(self._own_tool, 0, 0, at, flags, turn, buttons=buttons)
             data = self._stamped(pose)
             self._pose = pose
             self._send(data)
             return pose.seq
+
+        return self._wait(put, timeout, "the pose was not sent")
 
     def _stamped(self, pose: Pose) -> bytes:
         pose.stamp_us = time.monotonic_ns() // 1000
@@ -429,41 +483,65 @@ class Session:
             error = Disconnected(1000, "the session was closed")  # unless the asset's error is there already
         except PalpateError as found:
             error = found
-        except websockets.exceptions.ConnectionClosed as closed:
-            end = closed.rcvd or closed.sent
-            code, reason = (end.code, end.reason) if end else (1006, "")
-            error = Disconnected(code, reason or f"the connection has ended with code {code}")
-        except websockets.exceptions.InvalidStatusCode as refused:
-            error = Disconnected(0, f"the server answers with HTTP status {refused.status_code}")
-        except (OSError, ValueError, asyncio.TimeoutError, websockets.exceptions.WebSocketException) as found:
-            error = Disconnected(0, f"no connection to {self._url}: {str(found) or type(found).__name__}")
         with self._changed:
             self._error = self._error or error
+            self._joined = False
             self._changed.notify_all()
         self._loop.close()
 
     async def _live(self) -> None:
+        pause_s = _PAUSE_FIRST_S
+        self._spawn(self._repeat())
         try:
-            await self._connect()
+            while True:
+                n_join = self._n_join
+                lost = await self._connection()
+                with self._changed:
+                    self._forget(lost)
+                    self._changed.notify_all()
+                if not self._n_join or not self._reconnect or lost.code not in _MAY_RETURN:
+                    raise lost
+                if self._n_join > n_join:
+                    pause_s = _PAUSE_FIRST_S
+                await asyncio.sleep(pause_s)
+                pause_s = min(2 * pause_s, _PAUSE_MAX_S)
         finally:
-            for task in self._tasks:
+            others = asyncio.all_tasks() - {self._main}
+            for task in others:
                 task.cancel()
-            await asyncio.gather(*self._tasks, return_exceptions=True)
+            await asyncio.gather(*others, return_exceptions=True)
 
-    async def _connect(self) -> None:
+    async def _connection(self) -> Disconnected:
+        """One connection, from its beginning to its end; how it ended."""
+        try:
+            return await self._connect()
+        except websockets.exceptions.ConnectionClosed as closed:
+            end = closed.rcvd or closed.sent
+            code, reason = (end.code, end.reason) if end else (1006, "")
+            return Disconnected(code, reason or f"the connection has ended with code {code}")
+        except websockets.exceptions.InvalidStatusCode as refused:
+            return Disconnected(0, f"the server answers with HTTP status {refused.status_code}")
+        except (OSError, ValueError, asyncio.TimeoutError, websockets.exceptions.WebSocketException) as found:
+            return Disconnected(0, f"no connection to {self._url}: {str(found) or type(found).__name__}")
+
+    async def _connect(self) -> Disconnected:
         names = [Subprotocol(wire.PROTOCOL)] + ([Subprotocol("ticket." + self._ticket)] if self._ticket else [])
         async with websockets.client.connect(
             self._url, subprotocols=names, compression=None, max_size=_MESSAGE_MAX, open_timeout=10, close_timeout=2
         ) as socket:
-            self._socket = socket
             await socket.send(json.dumps(self._wanted))
-            self._spawn(self._repeat())
             async for data in socket:
                 with self._changed:
                     cycle = self._take(data)
+                    if self._joined and self._socket is None:
+                        self._socket = socket
+                        for message in self._subscribed.values():
+                            self._start(json.dumps(message))
                     self._changed.notify_all()
                 if cycle is not None:
                     await socket.send(write_ack(cycle, 0))  # frames are decoded when they are asked for
+        code = socket.close_code or 0
+        return Disconnected(code, socket.close_reason or f"the connection has ended with code {code}")
 
     async def _repeat(self) -> None:
         while True:
@@ -473,24 +551,62 @@ class Session:
             if data:
                 await self._write(data)
 
-    def _load(self, index: int, part: _Part, path: str) -> None:
-        """Fetches and decodes the asset of a part, then what came before it; in a thread of its own."""
+    def _forget(self, lost: Disconnected) -> None:
+        """What a connection that has ended leaves; under the lock."""
+        self._joined, self._socket, self._lost = False, None, str(lost)
+        self._tools = self._haptic = self._status = None
+        if self._own_tool is not None:
+            self._wanted["tool"] = self._own_tool
+            self._own_tool = None
+        for part in self._parts:
+            part.frame = part.field = part.interior = None
+        if self._order and not self._order.answer:
+            text = f"the connection was lost before {self._order.verb} was answered: {lost}"
+            self._order.error = Disconnected(lost.code, text)
+
+    # assets, in threads of their own: nobody waits for those of a server that sends no more
+
+    def _load_soon(self, part: _Part, path: str, take: Callable[[_Part, str, Asset], None]) -> None:
+        threading.Thread(target=self._load, args=(part, path, take), name="palpate asset", daemon=True).start()
+
+    def _load(self, part: _Part, path: str, take: Callable[[_Part, str, Asset], None]) -> None:
+        """Fetches and decodes an asset; its failure ends the session, unless the connection is lost or the part
+        replaced, when another one is loaded."""
         try:
-            asset = decode_asset(_get(self._url, path))
-            decoder = FrameDecoder(asset)
-            with self._changed:
-                part.asset, part.decoder, part.table = asset, decoder, asset.triangles.copy()
-                for data in part.early_deltas:
-                    self._take_part(part, wire.TOPOLOGY_DELTA, data)
-                part.early_deltas = []
-                self._changed.notify_all()
+            take(part, path, decode_asset(get(self._url, path, _ASSET_MAX, _ASSET_S)))
         except (OSError, ValueError, http.client.HTTPException, PalpateError) as error:
+            network = not isinstance(error, (urllib.error.HTTPError, ValueError, PalpateError))
             with self._changed:
-                if part not in self._parts:
-                    return  # replaced meanwhile: its file may be gone
-                self._error = self._error or PalpateError(f"the asset of part {index} is not loaded: {error}")
+                # a server that falls is often noticed here before the websocket ends
+                if network and self._reconnect:
+                    self._changed.wait_for(lambda: part not in self._parts or not self._joined, _ASSET_S)
+                if part not in self._parts or not self._joined:
+                    return
+                name = part.info.get("name", "")
+                self._error = self._error or PalpateError(f"an asset of part {name} is not loaded: {error}")
                 self._changed.notify_all()
             self._end_soon()
+
+    def _take_asset(self, part: _Part, path: str, asset: Asset) -> None:
+        loaded = _Loaded(path, asset, FrameDecoder(asset))
+        with self._changed:
+            part.loaded, part.table = loaded, asset.triangles.copy()
+            for data in part.early_deltas:
+                self._take_part(part, wire.TOPOLOGY_DELTA, data)
+            part.early_deltas = []
+            self._changed.notify_all()
+
+    def _take_inside(self, part: _Part, _: str, asset: Asset) -> None:
+        tetrahedra_of(asset.triangles)
+        with self._changed:
+            part.inside = asset
+            self._changed.notify_all()
+
+    def _load_inside(self, part: _Part, subscribed: Message) -> None:
+        path = part.info.get("interior")
+        if subscribed.get("interior") and not part.asked_inside and isinstance(path, str):
+            part.asked_inside = True
+            self._load_soon(part, path, self._take_inside)
 
     # messages, under the lock
 
@@ -505,7 +621,7 @@ class Session:
             return self._tools.cycle
         if kind == wire.HAPTIC:
             self._haptic = read_haptic(data)
-        elif kind in (wire.FRAME, wire.FIELD, wire.TOPOLOGY_DELTA):
+        elif kind in (wire.FRAME, wire.FIELD, wire.INTERIOR, wire.TOPOLOGY_DELTA):
             index, _ = epoch_of(data)
             if index < len(self._parts):
                 self._take_part(self._parts[index], kind, data)
@@ -518,12 +634,14 @@ class Session:
             part.frame = data
         elif kind == wire.FIELD:
             part.field = data
-        elif part.asset is None or part.table is None:
+        elif kind == wire.INTERIOR:
+            part.interior = data
+        elif part.loaded is None or part.table is None:
             n_byte = len(data) + sum(map(len, part.early_deltas))
             need(n_byte <= _MESSAGE_MAX, "COUNT", "too many changes of triangles have come before their asset")
             part.early_deltas.append(data)
         else:
-            delta = decode_topology_delta(data, len(part.table), len(part.asset.rest_m))
+            delta = decode_topology_delta(data, len(part.table), len(part.loaded.asset.rest_m))
             part.table[delta.slots] = delta.triangles
 
     def _take_control(self, message: Message) -> None:
@@ -534,10 +652,12 @@ class Session:
                 raise WireError("JSON", "a hello does not say who this member is")
             self._id = whole(you, "id")
             self._own_tool = None if you.get("tool") is None else whole(you, "tool")
-            self._replace_parts(objects(message, "parts"))
+            self._replace_parts(objects(message, "parts"), True)
             self._hello = message
+            self._joined = True
+            self._n_join += 1
         elif kind == "topology":
-            self._replace_parts(objects(message, "parts"))
+            self._replace_parts(objects(message, "parts"), False)
         elif kind == "status":
             self._status = message
         elif kind == "members":
@@ -556,18 +676,20 @@ class Session:
         elif kind == "error" and self._order and message.get("code") not in _NOT_OF_AN_ORDER:
             self._order.error = OrderRefused(text_of(message, "code"), text_of(message, "text"))
 
-    def _replace_parts(self, infos: list[Message]) -> None:
-        """New parts, and those of a new epoch, load their assets; the others stay."""
-        parts: list[_Part] = []
+    def _replace_parts(self, infos: list[Message], anew: bool) -> None:
+        """New parts, and those of a new epoch, load their assets; the others stay, but on a connection made anew, where
+        changes of triangles begin at the asset again."""
+        before, self._parts = self._parts, []
+        known = {part.path: part.loaded for part in before if part.loaded}
         for index, info in enumerate(infos):
             epoch, path = whole(info, "epoch"), text_of(info, "asset")
-            old = self._parts[index] if index < len(self._parts) else None
-            if old and old.epoch == epoch:
-                old.info = info
-                parts.append(old)
-                continue
-            parts.append(_Part(info, epoch))
-            # nobody waits for it: the thread of a server that sends no more ends with the program
-            load = threading.Thread(target=self._load, args=(index, parts[-1], path), name="palpate asset", daemon=True)
-            load.start()
-        self._parts = parts
+            part = before[index] if index < len(before) else None
+            if anew or part is None or (part.epoch, part.path) != (epoch, path):
+                part = _Part(info, epoch, path, known.get(path))
+                if part.loaded:
+                    part.table = part.loaded.asset.triangles.copy()
+                else:
+                    self._load_soon(part, path, self._take_asset)
+            part.info = info
+            self._parts.append(part)
+            self._load_inside(part, self._subscribed.get(index, {}))
