@@ -36,6 +36,7 @@ _REPEAT_S = 0.05  # period of the repeated pose of a resting tool: the server re
 _MESSAGE_MAX = 96 << 20  # bytes, as protocol/README.md, "Limits"
 _ASSET_MAX = 257 << 20  # bytes
 _ASSET_S = 60.0  # in which the server must go on sending an asset
+_NOTICE_S = 2.0  # in which the websocket of a server that has fallen ends as its files do
 _PAUSE_FIRST_S, _PAUSE_MAX_S = 0.25, 5.0  # before joining again; each is twice the one before
 # closures after which a client joins again (protocol/README.md, "Closing"); 0, 1005, 1006: without a code
 _MAY_RETURN = frozenset((0, 1000, 1001, 1005, 1006, 1011, 4002, 4003))
@@ -577,9 +578,8 @@ class Session:
         except (OSError, ValueError, http.client.HTTPException, PalpateError) as error:
             network = not isinstance(error, (urllib.error.HTTPError, ValueError, PalpateError))
             with self._changed:
-                # a server that falls is often noticed here before the websocket ends
                 if network and self._reconnect:
-                    self._changed.wait_for(lambda: part not in self._parts or not self._joined, _ASSET_S)
+                    self._changed.wait_for(lambda: part not in self._parts or not self._joined, _NOTICE_S)
                 if part not in self._parts or not self._joined:
                     return
                 name = part.info.get("name", "")
