@@ -165,11 +165,16 @@ export class Link {
     connect(options) {
         this.options = options;
         this.tries = 0;
+        this.close();
+        this.dial();
+    }
+
+    /** ends the connection; no message follows */
+    close() {
         const old = this.socket;
         this.socket = null;
         this.generation++;
         old?.close(1000);
-        this.dial();
     }
 
     dial() {
