@@ -16,7 +16,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { PATH = 1400, COMMAND = 32 };
+enum { PATH = 1400, COMMAND = 32, JSON_MAX_BYTE = 1 << 20 };
 static const char format[] = "palpate-results-1";
 
 struct pal_result_lines {
@@ -58,6 +58,40 @@ uint64_t pal_result_input_file(uint64_t hash, const char *path)
     if (stat(path, &state) || !S_ISREG(state.st_mode)) return hash;
     if (pal_file_read(path, (size_t)1 << 30, &bytes, &n_byte, NULL)) return hash;
     hash = pal_hash_bytes(hash, bytes, n_byte);
+    free(bytes);
+    return hash;
+}
+
+/* of the files that the texts of an item and of what it holds name, beside a file */
+static uint64_t hash_named(uint64_t hash, const cJSON *item, const char *beside, int n_folder)
+{
+    char path[PATH];
+    struct stat state;
+    const char *text = cJSON_GetStringValue(item);
+    if (text && text[0] && snprintf(path, PATH, "%.*s%s", text[0] == '/' ? 0 : n_folder, beside, text) < PATH &&
+        !stat(path, &state) && S_ISREG(state.st_mode))
+        hash = pal_result_input_file(hash, path);
+    /* a parser of JSON has bounded the depth */
+    for (const cJSON *child = item ? item->child : NULL; child; child = child->next)
+        hash = hash_named(hash, child, beside, n_folder);
+    return hash;
+}
+
+uint64_t pal_result_input_tree(uint64_t hash, const char *path)
+{
+    char file[PATH];
+    struct stat state;
+    uint8_t *bytes;
+    size_t n_byte;
+    const bool folder = !stat(path, &state) && S_ISDIR(state.st_mode);
+    if (snprintf(file, PATH, folder ? "%s/scene.json" : "%s", path) >= PATH) return hash;
+    hash = pal_result_input_file(hash, file);
+    if (stat(file, &state) || !S_ISREG(state.st_mode) || state.st_size > JSON_MAX_BYTE) return hash;
+    if (pal_file_read(file, JSON_MAX_BYTE, &bytes, &n_byte, NULL)) return hash;
+    cJSON *root = cJSON_ParseWithLength((const char *)bytes, n_byte);
+    const char *slash = strrchr(file, '/');
+    hash = hash_named(hash, root, file, slash ? (int)(slash - file) + 1 : 0);
+    cJSON_Delete(root);
     free(bytes);
     return hash;
 }

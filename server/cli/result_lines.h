@@ -56,6 +56,9 @@ pal_err pal_shard_flags_check(pal_shard_flags *flags, pal_diagnostic *diag);
 pal_err pal_shard_read(const char *text, int *shard, int *n_shard, pal_diagnostic *diag);
 /* Hash of the bytes of a file, continued from `hash`; of its name alone if it cannot be read. */
 uint64_t pal_result_input_file(uint64_t hash, const char *path);
+/* The same of a JSON file, or of scene.json in a folder, and of every file that a text in it names, as a problem its
+ * surface and a scene its meshes; relative names are looked up beside the JSON file. */
+uint64_t pal_result_input_tree(uint64_t hash, const char *path);
 
 /* Opens the file of a shard, with the results that it holds, makes folder and file, and locks the file. Errors: STATE:
  * another process computes this shard; REFUSED (names file and line): results of another input or damaged; IO, MEMORY.

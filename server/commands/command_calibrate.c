@@ -6,6 +6,8 @@
 #include "server/calibrate/calibrate_run.h"
 #include "server/calibrate/tuning.h"
 #include "server/cli/report.h"
+#include "server/commands/calibrate_starts.h"
+#include "server/commands/calibrate_targets.h"
 #include "server/commands/commands.h"
 #include "server/commands/recorded_input.h"
 #include "server/commands/tuning.h"
@@ -14,13 +16,10 @@
 #include "server/scene/scene_file.h"
 #include "server/study/tuning.h"
 
-#include <errno.h>
 #include <float.h>
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 static const char about[] =
     "Finds spring constants (edges, faces, volumes) whose equilibrium matches finite elements or measured\n"
@@ -32,13 +31,13 @@ static const char about[] =
     "stillest moment under a large force, and the damping is that with which the springs return as the recorded body\n"
     "did after a touch. Ctrl-C ends the search and writes the best result; a second Ctrl-C ends the process.\n";
 
-/* grid: three numbers of 20 characters each fit into the 1 MiB of a scene file */
-enum { MANY_SUBSTEPS = 200, MAX_GRID = 16000 };
+enum { MANY_SUBSTEPS = 200 };
 
 typedef struct arguments {
     const char *grid, *method, *weights, *area;
     double budget_s;
     int evaluations, seed;
+    pal_calibrate_starts starts;
 } arguments;
 
 /* ---- progress ---- */
@@ -76,98 +75,25 @@ static bool record_step(void *user, const pal_fit_step *step)
 static const char *read_arguments(pal_calibrate_run *run, const arguments *args)
 {
     if (!run->from && (!run->input.fit || !*run->input.fit)) return "--case ID is missing";
+    const pal_calibrate_starts *starts = &args->starts;
     const char *scene = run->path[PAL_CALIBRATE_SCENE];
-    if (!scene || !*scene) return "-o SCENE.json is missing";
+    if (starts->shard.shard) {
+        for (int k = 0; k < PAL_CALIBRATE_FILES; k++)
+            if (run->path[k]) return "--shard: does not go with files to write, --merge writes them";
+    } else if (!scene || !*scene) {
+        return "-o SCENE.json is missing";
+    }
     const char *wrong = args->grid ? pal_calibrate_grid(args->grid, run->options.grid) : NULL;
     if (wrong) return wrong;
     run->annealing = args->method && !strcmp(args->method, "annealing");
+    if (!run->annealing && (starts->n > 1 || starts->shard.shard || starts->shard.merge))
+        return "--starts, --shard and --merge go with --method annealing: adjoint is one search without a seed";
     run->options.equal = args->weights && !strcmp(args->weights, "equal");
     if (args->area) run->options.without_area = !strcmp(args->area, "off");
     run->fit.budget_s = args->budget_s;
     run->fit.max_evaluation = args->evaluations;
     run->fit.seed = (uint64_t)args->seed;
     return NULL;
-}
-
-/* ---- output files ---- */
-
-static const char *const target_flag[PAL_CALIBRATE_FILES] = {"-o", "--trajectory", "--picture", "--vtk"};
-
-/* do two paths name one file, whether it exists or not? */
-static bool is_same_file(const char *a, const char *b)
-{
-    char real[2][PATH_MAX], folder[PATH_MAX];
-    const char *path[2] = {a, b}, *name[2];
-    for (int k = 0; k < 2; k++) {
-        const char *slash = strrchr(path[k], '/');
-        name[k] = slash ? slash + 1 : path[k];
-        if (!pal_json_folder(path[k], folder, sizeof folder) || !realpath(folder, real[k])) return false;
-    }
-    return !strcmp(real[0], real[1]) && !strcmp(name[0], name[1]);
-}
-
-/* can a file of this name be written? Its folder is made. Refused before the search, not after it */
-static pal_err check_target(const char *flag, const char *path, pal_diagnostic *diag)
-{
-    char folder[PAL_CALIBRATE_PATH];
-    struct stat facts;
-    if (!path) return PAL_ERR_OK;
-    const char *slash = strrchr(path, '/');
-    if (!pal_json_folder(path, folder, sizeof folder) || !path[0] || (slash && !slash[1]))
-        return PAL_REFUSE(diag, "%s: \"%.80s\" is not the name of a file", flag, path);
-    PAL_TRY(pal_scene_make_folder(folder, diag));
-    if (access(folder, W_OK | X_OK))
-        return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %.200s: cannot be written: %s", flag, path, strerror(errno));
-    if (!stat(path, &facts) && S_ISDIR(facts.st_mode))
-        return PAL_REFUSE(diag, "%s: %.200s is a folder, wanted a file in it", flag, path);
-    if (!stat(path, &facts) && !S_ISREG(facts.st_mode))
-        return PAL_REFUSE(diag, "%s: %.200s exists and is not a file", flag, path);
-    return PAL_ERR_OK;
-}
-
-/* refuses an output that is also an input */
-static pal_err check_source(const char *flag, const char *path, const char *source, const char *what,
-                            pal_diagnostic *diag)
-{
-    char own[PATH_MAX], other[PATH_MAX];
-    if (path && source && realpath(path, own) && realpath(source, other) && !strcmp(own, other))
-        return PAL_REFUSE(diag, "%s: %.200s is the %s itself", flag, path, what);
-    return PAL_ERR_OK;
-}
-
-static pal_err check_targets(const pal_calibrate_run *run, pal_diagnostic *diag)
-{
-    char folder_scene[PATH_MAX];
-    const int *grid = run->options.grid;
-    snprintf(folder_scene, sizeof folder_scene, "%s/scene.json", run->input.problem);
-    if ((int64_t)grid[0] * grid[1] * grid[2] > MAX_GRID)
-        return PAL_REFUSE(diag, "--grid: %d x %d x %d nodes, more than the %d that a scene file holds", grid[0],
-                          grid[1], grid[2], MAX_GRID);
-    const char *const *path = run->path;
-    for (int a = 0; a < PAL_CALIBRATE_FILES; a++) {
-        PAL_TRY(check_target(target_flag[a], path[a], diag));
-        PAL_TRY(check_source(target_flag[a], path[a], run->input.problem, "problem", diag));
-        PAL_TRY(check_source(target_flag[a], path[a], run->input.truth, "truth", diag));
-        PAL_TRY(check_source(target_flag[a], path[a], run->from, "recording", diag));
-        PAL_TRY(check_source(target_flag[a], path[a], folder_scene, "scene that was recorded", diag));
-        for (int b = 0; b < a && path[a]; b++)
-            if (path[b] && is_same_file(path[a], path[b]))
-                return PAL_REFUSE(diag, "%s: %.200s is the file of %s as well", target_flag[a], path[a],
-                                  target_flag[b]);
-    }
-    return PAL_ERR_OK;
-}
-
-/* the same for the files that the problem names */
-static pal_err check_sources(const pal_calibrate_run *run, pal_diagnostic *diag)
-{
-    const pal_problem *p = run->set.problem;
-    for (int a = 0; a < PAL_CALIBRATE_FILES; a++) {
-        PAL_TRY(check_source(target_flag[a], run->path[a], p->surface, "problem's surface", diag));
-        for (int k = 0; k < p->n_reference; k++)
-            PAL_TRY(check_source(target_flag[a], run->path[a], p->reference[k].file, "problem's reference", diag));
-    }
-    return PAL_ERR_OK;
 }
 
 /* springs, truths and their errors at the start */
@@ -198,7 +124,8 @@ static pal_err prepare_touches(pal_calibrate_run *run, pal_recorded_loads *loads
     }
 }
 
-static pal_err search(pal_calibrate_run *run, pal_recorded_input *recorded, pal_diagnostic *diag)
+static pal_err search(pal_calibrate_run *run, pal_calibrate_starts *starts, pal_recorded_input *recorded,
+                      pal_diagnostic *diag)
 {
     enum { ALL = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY };
     run->options.progress = pal_report_continue;
@@ -213,9 +140,10 @@ static pal_err search(pal_calibrate_run *run, pal_recorded_input *recorded, pal_
     memcpy(run->theta, run->info.start, n);
     run->fit.step = record_step;
     run->fit.user = run;
-    pal_err err = run->annealing ? pal_fit_anneal(c, &run->fit, run->theta, &run->result, diag)
+    pal_err err = run->annealing ? pal_calibrate_starts_run(starts, run, diag)
                                  : pal_fit_adjoint(c, &run->fit, run->theta, &run->result, diag);
-    if (err) return pal_diagnostic_prefix(diag, err, run->input.problem);
+    if (err == PAL_ERR_NUMERIC || err == PAL_ERR_MEMORY) return pal_diagnostic_prefix(diag, err, run->input.problem);
+    if (err || starts->shard.shard) return err;
     return pal_calibration_evaluate(c, run->workspace, run->theta, ALL, &run->last, NULL, diag);
 }
 
@@ -278,14 +206,16 @@ static pal_err open_recording(pal_calibrate_run *run, pal_recorded_input *record
     return PAL_ERR_OK;
 }
 
-static pal_err work(pal_calibrate_run *run, pal_recorded_input *recorded, pal_diagnostic *diag)
+static pal_err work(pal_calibrate_run *run, pal_calibrate_starts *starts, pal_recorded_input *recorded,
+                    pal_diagnostic *diag)
 {
     pal_loaded_scene *scene = NULL;
-    PAL_TRY(check_targets(run, diag));
+    PAL_TRY(pal_calibrate_targets_check(run, diag));
     PAL_TRY(open_recording(run, recorded, diag));
     PAL_TRY(pal_calibrate_cases_read(&run->input, &run->set, diag));
-    PAL_TRY(check_sources(run, diag));
-    PAL_TRY(search(run, recorded, diag));
+    PAL_TRY(pal_calibrate_targets_check_named(run, diag));
+    PAL_TRY(search(run, starts, recorded, diag));
+    if (starts->shard.shard) return PAL_ERR_OK;
     PAL_TRY(pal_calibrate_scene(run, &scene, diag));
     pal_err err = settle(run, scene, diag);
     if (!err) {
@@ -455,7 +385,14 @@ static void print_live(const pal_calibrate_run *run)
                run->n_substep);
 }
 
-static void print(const pal_calibrate_run *run)
+/* what a shard did */
+static void print_shard(const pal_calibrate_starts *s)
+{
+    printf("shard %d of %d: %d results are in %s, %d of them from before\n", s->shard.index, s->shard.n,
+           s->n_before + s->n_new, s->shard.folder, s->n_before);
+}
+
+static void print(const pal_calibrate_run *run, const pal_calibrate_starts *starts)
 {
     const pal_calibration_info *i = &run->info;
     const pal_fit_result *r = &run->result;
@@ -465,6 +402,8 @@ static void print(const pal_calibrate_run *run)
     if (i->grid)
         printf("grid %d x %d x %d, %d of its nodes touch the body: %d constants\n", i->grid->n[0], i->grid->n[1],
                i->grid->n[2], i->n_used, i->n_parameter);
+    if (starts->n > 1)
+        printf("the best of %d searches is that of seed %lld\n", starts->n, (long long)run->fit.seed + starts->chosen);
     printf("%s: %s after %lld evaluations", pal_calibrate_method(run), r->ended, (long long)r->n_evaluation);
     if (r->n_rejected > 0) printf(" (%lld without a rest)", (long long)r->n_rejected);
     printf(" and %.2f s\n", r->seconds);
@@ -547,7 +486,13 @@ static cJSON *release_json(const pal_calibrate_run *run)
                     {"runs", JSON_NUMBER(r->n_run)});
 }
 
-static cJSON *as_json(const pal_calibrate_run *run)
+static cJSON *shard_json(const pal_calibrate_starts *s)
+{
+    return PAL_JSON({"ok", JSON_BOOL(true)}, {"shard", JSON_NUMBER(s->shard.index)}, {"of", JSON_NUMBER(s->shard.n)},
+                    {"results", JSON_NUMBER(s->n_before + s->n_new)}, {"before", JSON_NUMBER(s->n_before)});
+}
+
+static cJSON *as_json(const pal_calibrate_run *run, const pal_calibrate_starts *starts)
 {
     const pal_calibration_info *i = &run->info;
     const pal_fit_result *r = &run->result;
@@ -559,15 +504,17 @@ static cJSON *as_json(const pal_calibrate_run *run)
     cJSON *seconds = PAL_JSON({"prepare", pal_json_or_null(i->prepare_s)}, {"truth", pal_json_or_null(i->truth_s)},
                               {"fit", pal_json_or_null(r->seconds)}, {"live", pal_json_or_null(run->settle_s)},
                               {"total", pal_json_or_null(run->total_s)});
-    cJSON *o = PAL_JSON(
-        {"ok", JSON_BOOL(true)}, {"problem", JSON_TEXT(run->set.problem->name)}, {"cases", cases_json(run)},
-        {"error_percent", pal_json_or_null(pal_calibrate_mean(run, &run->last, true))},
-        {"start_percent", pal_json_or_null(pal_calibrate_mean(run, &run->start, true))},
-        {"hand_percent", pal_json_or_null(pal_calibrate_mean(run, &run->hand, true))},
-        {"verify_percent", pal_json_or_null(pal_calibrate_mean(run, &run->last, false))},
-        {"method", JSON_TEXT(pal_calibrate_method(run))}, {"evaluations", pal_json_or_null(r->n_evaluation)},
-        {"rejected", pal_json_or_null(r->n_rejected)},
-        {"spent", pal_json_or_null(r->n_spent > 0 ? r->n_spent : r->n_evaluation)}, {"ended", JSON_TEXT(r->ended)});
+    cJSON *o =
+        PAL_JSON({"ok", JSON_BOOL(true)}, {"problem", JSON_TEXT(run->set.problem->name)}, {"cases", cases_json(run)},
+                 {"error_percent", pal_json_or_null(pal_calibrate_mean(run, &run->last, true))},
+                 {"start_percent", pal_json_or_null(pal_calibrate_mean(run, &run->start, true))},
+                 {"hand_percent", pal_json_or_null(pal_calibrate_mean(run, &run->hand, true))},
+                 {"verify_percent", pal_json_or_null(pal_calibrate_mean(run, &run->last, false))},
+                 {"method", JSON_TEXT(pal_calibrate_method(run))}, {"evaluations", pal_json_or_null(r->n_evaluation)},
+                 {"rejected", pal_json_or_null(r->n_rejected)},
+                 {"spent", pal_json_or_null(r->n_spent > 0 ? r->n_spent : r->n_evaluation)},
+                 {"ended", JSON_TEXT(r->ended)}, {"starts", run->annealing ? JSON_NUMBER(starts->n) : NULL},
+                 {"seed", run->annealing ? JSON_NUMBER(run->fit.seed + (uint64_t)starts->chosen) : NULL});
     add_constants(run, o);
     return PAL_JSON_ADD(o, {"at_bound", pal_json_or_null(n_bound)}, {"nodes", pal_json_or_null(i->n_node)},
                         {"free_nodes", pal_json_or_null(i->n_free)}, {"tets", pal_json_or_null(i->n_tet)},
@@ -583,16 +530,23 @@ static cJSON *as_json(const pal_calibrate_run *run)
                         {"release", release_json(run)});
 }
 
-static int start(pal_calibrate_run *run)
+static int start(pal_calibrate_run *run, pal_calibrate_starts *starts)
 {
     pal_diagnostic diag = {""};
     double begin = pal_clock_s();
     pal_stop_watch();
     pal_recorded_input recorded = {0};
-    pal_err err = work(run, &recorded, &diag);
+    pal_err err = work(run, starts, &recorded, &diag);
     run->total_s = pal_clock_s() - begin;
-    int code = pal_report_end(&run->common, err, &diag, err || !run->common.json ? NULL : as_json(run));
-    if (!err && !run->common.json && !run->common.quiet) print(run);
+    const bool shard = starts->shard.shard != NULL;
+    cJSON *object = err || !run->common.json ? NULL : shard ? shard_json(starts) : as_json(run, starts);
+    int code = pal_report_end(&run->common, err, &diag, object);
+    if (!err && !run->common.json && !run->common.quiet) {
+        if (shard)
+            print_shard(starts);
+        else
+            print(run, starts);
+    }
     pal_calibration_workspace_destroy(run->workspace);
     pal_calibration_destroy(run->calibration);
     pal_calibrate_cases_free(&run->set);
@@ -605,7 +559,7 @@ static int start(pal_calibrate_run *run)
 int command_calibrate(int argc, char **argv)
 {
     static pal_calibrate_run run;
-    arguments args = {0};
+    arguments args = {.starts.n = 1};
     run = (pal_calibrate_run){0};
     pal_calibrate_options *o = &run.options;
     pal_calibrate_default(o);
@@ -628,6 +582,9 @@ int command_calibrate(int argc, char **argv)
          "limit of evaluations (1000; annealing 4000)"},
         {"--enough", "PERCENT", PAL_FLAG_NUMBER, &run.fit.target_percent, 1e-9, 1e9, "end the search at this error"},
         {"--seed", "S", PAL_FLAG_COUNT, &args.seed, 0, INT_MAX, "annealing: the same seed gives the same result (0)"},
+        {"--starts", "N", PAL_FLAG_COUNT, &args.starts.n, 1, PAL_CALIBRATE_STARTS_MAX,
+         "annealing: N searches with seeds from S on, of which the one with the smallest error is taken (1)"},
+        PAL_SHARD_FLAGS(args.starts.shard, "search of --starts"),
         {"--workers", "N", PAL_FLAG_COUNT, &run.fit.n_worker, 1, 256,
          "annealing: threads; the result is the same for any number (one per core)"},
         {"--resolution", "N", PAL_FLAG_COUNT, &o->voxel.resolution, 2, 200,
@@ -674,7 +631,9 @@ int command_calibrate(int argc, char **argv)
         .operands = {1, 1}};
     int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.input.problem, &n);
     if (code >= 0) return code;
+    pal_diagnostic diag;
+    if (pal_shard_flags_check(&args.starts.shard, &diag)) return pal_flags_wrong(&run.common, "%s", diag.text);
     const char *sentence = read_arguments(&run, &args);
     if (sentence) return pal_flags_wrong(&run.common, "%s", sentence);
-    return start(&run);
+    return start(&run, &args.starts);
 }

@@ -8,7 +8,7 @@
 #include "server/commands/commands.h"
 #include "server/commands/tuning.h"
 #include "server/mesh/files/mesh_file.h"
-#include "server/mesh/scan/label_volume.h"
+#include "server/mesh/scan/dicom_series.h"
 #include "server/scene/scene_arg.h"
 #include "server/scene/scene_file.h"
 #include "server/sim/world/world.h"
@@ -29,9 +29,10 @@ enum { PATH = 1200, TETGEN_MAX = 1000000, LABELS = 256, FILES = 64, SENTENCE = 1
 
 static const char about[] =
     "Makes a scene from a surface (OBJ, STL, PLY, OFF) or a segmented scan (NIfTI .nii .nii.gz, NRRD .nrrd,\n"
-    "MetaImage .mha, INRIMAGE .inr .inr.gz), as 3D Slicer exports them: tetrahedra (paper B section 2.2), skin,\n"
-    "tissue, supports and tools. `palpate serve DIR/scene.json`\n"
-    "serves it. With --model adaptive the surface of a hollow organ carries springs and refines where it is\n"
+    "MetaImage .mha, INRIMAGE .inr .inr.gz), as 3D Slicer exports them, or from a folder with a DICOM series, which\n"
+    "the program dcm2niix converts: tetrahedra (paper B section 2.2), skin, tissue, supports and tools.\n"
+    "`palpate serve DIR/scene.json` serves it. With --model adaptive the surface of a hollow organ carries springs and "
+    "refines where it is\n"
     "touched (paper C).\n"
     "\n"
     "Voxels connect through faces. A component without a support is dropped, with a message, when it is below 1 %\n"
@@ -44,7 +45,7 @@ static const char about[] =
 
 typedef struct arguments {
     pal_surface_scene scene;
-    const char *folder, *units, *up, *axes, *name, *title, *source, *model;
+    const char *folder, *units, *up, *axes, *name, *title, *source, *model, *threshold;
     double hold_percent, thickness_mm;
     bool procedural, list_labels, tetgen, no_tetgen;
 } arguments;
@@ -71,7 +72,7 @@ static int list_labels(const pal_flag_common *common, const char *path)
     pal_label_volume volume;
     static pal_label_count count[LABELS];
     pal_diagnostic diag = {""};
-    pal_err err = pal_label_volume_read(path, &volume, &diag);
+    pal_err err = pal_scan_read(path, &volume, &diag);
     if (err) return pal_report_refusal(common, err, &diag);
     int n = pal_label_volume_list(&volume, count, LABELS);
     pal_label_volume_free(&volume);
@@ -477,6 +478,13 @@ static bool read_axis(const char *word, double axis[3])
     return true;
 }
 
+static bool read_threshold(const char *text, pal_surface_scene *scene)
+{
+    int end = 0;
+    scene->threshold = true;
+    return sscanf(text, "%d,%d%n", &scene->low, &scene->high, &end) == 2 && !text[end] && scene->low <= scene->high;
+}
+
 static arguments args = {.scene = {.label = -1, .material = {0, 0.45, 1000, PAL_DAMPING_DERIVED, 1}}};
 static const pal_flag flag[] = {
     {"-o", "DIR", PAL_FLAG_TEXT, &args.folder, 0, 0, "folder to write; made when it does not exist"},
@@ -502,6 +510,8 @@ static const pal_flag flag[] = {
     {"--area-springs", NULL, PAL_FLAG_SWITCH, &args.scene.area_springs, 0, 0,
      "springs: preserve face areas too (edges and volumes alone have the same moduli at half the cost)"},
     {"--label", "N", PAL_FLAG_COUNT, &args.scene.label, 1, INT32_MAX, "label of a segmented scan (the most frequent)"},
+    {"--threshold", "LOW,HIGH", PAL_FLAG_TEXT, &args.threshold, 0, 0,
+     "the voxels of a volume with values in this range, as 200,3000 Hounsfield units for bone, in place of a label"},
     {"--list-labels", NULL, PAL_FLAG_SWITCH, &args.list_labels, 0, 0, "only list the labels of a segmented scan"},
     {"--no-image", NULL, PAL_FLAG_SWITCH, &args.scene.no_image, 0, 0,
      "leave the images of an OBJ file out (map_Kd of its materials: PNGs or JPEGs beside the file)"},
@@ -564,6 +574,10 @@ int command_prepare(int argc, char **argv)
     if (args.tetgen && args.no_tetgen) return pal_flags_wrong(&common, "--tetgen and --no-tetgen exclude each other");
     if (args.up && !read_axis(args.up, args.scene.up))
         return pal_flags_wrong(&common, "--up: is not x, y, z, -x, -y or -z");
+    if (args.threshold && !read_threshold(args.threshold, &args.scene))
+        return pal_flags_wrong(&common, "--threshold: is not LOW,HIGH, two whole numbers that ascend, as 200,3000");
+    if (args.threshold && args.scene.label >= 0)
+        return pal_flags_wrong(&common, "--threshold and --label exclude each other");
     const char *fault = args.axes ? pal_anatomical_axes_fault(args.axes) : NULL;
     if (fault) return pal_flags_wrong(&common, "--axes: %.20s %s", args.axes, fault);
     if (args.axes) snprintf(args.scene.axes, sizeof args.scene.axes, "%.3s", args.axes);

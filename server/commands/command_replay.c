@@ -3,9 +3,11 @@
 #include "server/cli/report.h"
 #include "server/commands/commands.h"
 #include "server/commands/scene_input.h"
+#include "server/commands/shown_moment.h"
 #include "server/commands/vtu_series.h"
 #include "server/session/replay.h"
 
+#include <math.h>
 #include <stdio.h>
 
 static cJSON *as_json(const pal_replay_report *r, double seconds)
@@ -21,31 +23,84 @@ static cJSON *as_json(const pal_replay_report *r, double seconds)
                     {"seconds", JSON_NUMBER(seconds)});
 }
 
+typedef struct arguments {
+    bool strict;
+    double rate_hz;
+} arguments;
+
 typedef struct replay_run {
     pal_flag_common common;
+    pal_scene_input input;
     pal_vtu_series series; /* folder NULL: none is asked for */
-    pal_err series_err;
-    pal_diagnostic series_diag;
+    pal_shown_moment moment;
+    uint64_t n_step; /* so far; a reset of the world does not set it back */
+    pal_err write_err;
+    pal_diagnostic write_diag;
 } replay_run;
 
-static bool show(void *user, const pal_world *world, double fraction)
+static double now_s(const replay_run *run)
 {
-    replay_run *run = user;
-    pal_report_progress("replay", fraction, &run->common);
-    if (run->series.folder) run->series_err = pal_vtu_series_step(&run->series, world, &run->series_diag);
-    return !run->series_err;
+    return (double)run->n_step * run->input.studied.scene->step_s;
 }
 
-int command_replay(int argc, char **argv)
+static bool step(void *user, const pal_world *world, double fraction)
 {
-    bool strict = false;
-    double rate_hz = 25;
-    replay_run run = {.series_err = PAL_ERR_OK};
+    replay_run *run = user;
+    run->n_step++;
+    pal_report_progress("replay", fraction, &run->common);
+    if (run->series.folder) run->write_err = pal_vtu_series_step(&run->series, world, now_s(run), &run->write_diag);
+    if (!run->write_err)
+        run->write_err =
+            pal_shown_moment_step(&run->moment, run->input.studied.scene, world, now_s(run), &run->write_diag);
+    return !run->write_err;
+}
+
+static void end(void *user, const pal_world *world)
+{
+    replay_run *run = user;
+    run->write_err = pal_shown_moment_end(&run->moment, run->input.studied.scene, world, now_s(run), &run->write_diag);
+}
+
+static pal_err replay(replay_run *run, const char *log, const char *scene, bool strict, pal_replay_report *report,
+                      pal_diagnostic *diag)
+{
+    const pal_replay_watch watch = {.step = step, .user = run, .end = end};
+    PAL_TRY(pal_scene_input_open(scene, &run->input, diag));
+    if (strict) PAL_TRY(pal_replay_run(log, NULL, NULL, report, diag));
+    if (strict && report->cut[0]) return PAL_REFUSE(diag, "%s", report->cut);
+    pal_err err = pal_replay_run(log, run->input.studied.scene, &watch, report, diag);
+    if (run->write_err) return *diag = run->write_diag, run->write_err;
+    return !err && run->series.folder ? pal_vtu_series_end(&run->series, diag) : err;
+}
+
+static void print(const replay_run *run, const pal_replay_report *report)
+{
+    const pal_shown_moment *moment = &run->moment;
+    if (report->n_hash == report->n_hash_equal)
+        printf("%llu steps, %llu poses, %llu commands: all %llu hashes equal, the last is %016llx\n",
+               (unsigned long long)report->n_tick, (unsigned long long)report->n_pose,
+               (unsigned long long)report->n_command, (unsigned long long)report->n_hash,
+               (unsigned long long)report->last_hash);
+    if (run->series.folder) printf("wrote %d moments, %s/series.pvd\n", run->series.n_moment, run->series.folder);
+    if (moment->glb) printf("wrote %s, the surfaces at %.9g s\n", moment->glb, moment->time_s);
+    if (moment->vtp) printf("wrote %s, the surfaces at %.9g s\n", moment->vtp, moment->time_s);
+}
+
+/* the exit code, -1: go on */
+static int parse(int argc, char **argv, arguments *args, replay_run *run, const char *word[2])
+{
+    int n = 0;
     const pal_flag flag[] = {
-        {"--strict", NULL, PAL_FLAG_SWITCH, &strict, 0, 0, "refuse a log that is cut or damaged"},
-        {"--vtu", "FOLDER", PAL_FLAG_TEXT, &run.series.folder, 0, 0,
+        {"--strict", NULL, PAL_FLAG_SWITCH, &args->strict, 0, 0, "refuse a log that is cut or damaged"},
+        {"--vtu", "FOLDER", PAL_FLAG_TEXT, &run->series.folder, 0, 0,
          "write the deformed elements with their fields for ParaView, which opens FOLDER/series.pvd"},
-        {"--rate", "HZ", PAL_FLAG_NUMBER, &rate_hz, 0.01, 1000, "moments of --vtu in a simulated second (25)"},
+        {"--rate", "HZ", PAL_FLAG_NUMBER, &args->rate_hz, 0.01, 1000, "moments of --vtu in a simulated second (25)"},
+        {"--gltf", "FILE.glb", PAL_FLAG_TEXT, &run->moment.glb, 0, 0,
+         "write the surfaces at one moment as glTF: metres, y up, a material for each body and image"},
+        {"--vtp", "FILE.vtp", PAL_FLAG_TEXT, &run->moment.vtp, 0, 0,
+         "write them for ParaView, in the frame of the scene, with their displacement"},
+        {"--at", "SECONDS", PAL_FLAG_NUMBER, &run->moment.at_s, 0, 1e6,
+         "the moment of --gltf and --vtp, simulated time since the start of the log (its end)"},
     };
     const pal_flag_table table = {
         .usage = "replay LOG SCENE [flags]",
@@ -56,42 +111,40 @@ int command_replay(int argc, char **argv)
         PAL_FLAGS(flag),
         .example = "palpate prepare --procedural -o organ\n"
                    "palpate serve organ/scene.json --record organ.log --port 0 --seconds 2\n"
-                   "palpate replay organ.log organ/scene.json --vtu organ_vtu\n",
+                   "palpate replay organ.log organ/scene.json --vtu organ_vtu --gltf organ.glb --at 1\n",
         .operands = {2, 2}};
-    const char *word[2];
-    int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, word, &n);
-
+    const int code = pal_flags_parse(&table, argc, argv, &run->common, word, &n);
     if (code >= 0) return code;
-    pal_scene_input input = {0};
+    if (isfinite(run->moment.at_s) && !run->moment.glb && !run->moment.vtp)
+        return pal_flags_wrong(&run->common, "--at: goes with --gltf or --vtp");
+    run->series.period_s = 1 / args->rate_hz;
+    return -1;
+}
+
+int command_replay(int argc, char **argv)
+{
+    arguments args = {.rate_hz = 25};
+    replay_run run = {.moment.at_s = (double)NAN};
+    const char *word[2];
     pal_diagnostic diag = {""};
     pal_replay_report report;
-    double start = pal_clock_s();
-    run.series.period_s = 1 / rate_hz;
-    const pal_replay_watch watch = {.step = show, .user = &run};
-    pal_err err = pal_scene_input_open(word[1], &input, &diag);
-    if (!err && strict) err = pal_replay_run(word[0], NULL, NULL, &report, &diag);
-    if (!err && strict && report.cut[0]) err = PAL_REFUSE(&diag, "%s", report.cut);
-    if (!err) err = pal_replay_run(word[0], input.studied.scene, &watch, &report, &diag);
-    if (run.series_err) err = run.series_err, diag = run.series_diag;
-    if (!err && run.series.folder) err = pal_vtu_series_end(&run.series, &diag);
+    int code = parse(argc, argv, &args, &run, word);
+    if (code >= 0) return code;
+
+    const double start = pal_clock_s();
+    const pal_err err = replay(&run, word[0], word[1], args.strict, &report, &diag);
     pal_vtu_series_free(&run.series);
     pal_report_progress(NULL, 0, &run.common);
-    pal_scene_input_close(&input);
+    pal_scene_input_close(&run.input);
     if (err) return pal_report_refusal(&run.common, err, &diag);
     if (report.cut[0]) fprintf(stderr, "palpate replay: %s; replayed up to there\n", report.cut);
-    bool equal = report.n_hash == report.n_hash_equal;
+    const bool equal = report.n_hash == report.n_hash_equal;
     if (!equal)
         fprintf(stderr, "palpate replay: %s: the world differs from step %llu on: %llu of %llu hashes are equal\n",
                 word[0], (unsigned long long)report.first_difference, (unsigned long long)report.n_hash_equal,
                 (unsigned long long)report.n_hash);
     if (run.common.json && (code = pal_report_json(&run.common, as_json(&report, pal_clock_s() - start))) > 0)
         return code;
-    if (equal && !run.common.json && !run.common.quiet)
-        printf("%llu steps, %llu poses, %llu commands: all %llu hashes equal, the last is %016llx\n",
-               (unsigned long long)report.n_tick, (unsigned long long)report.n_pose,
-               (unsigned long long)report.n_command, (unsigned long long)report.n_hash,
-               (unsigned long long)report.last_hash);
-    if (run.series.folder && !run.common.json && !run.common.quiet)
-        printf("wrote %d moments, %s/series.pvd\n", run.series.n_moment, run.series.folder);
+    if (!run.common.json && !run.common.quiet) print(&run, &report);
     return equal ? 0 : 1;
 }

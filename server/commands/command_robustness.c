@@ -413,7 +413,7 @@ static bool known_models(const char *models)
     return known;
 }
 
-/* hash of the jobs, the options and the files that the words name */
+/* hash of the jobs, the options, the files that the words name, and those that these name */
 static uint64_t input_of(const pal_robustness_job *job, int n, const pal_robustness_options *options)
 {
     char text[1400];
@@ -423,9 +423,8 @@ static uint64_t input_of(const pal_robustness_job *job, int n, const pal_robustn
     hash = pal_hash_bytes(hash, only, strlen(only) + 1);
     for (int k = 0; k < n; k++) {
         hash = pal_hash_bytes(hash, job[k].model, strlen(job[k].model) + 1);
-        hash = pal_result_input_file(hash, job[k].word);
-        snprintf(text, sizeof text, "%.1199s/scene.json", job[k].word);
-        if (!job[k].model[0]) hash = pal_result_input_file(hash, text);
+        hash = pal_hash_bytes(hash, job[k].word, strlen(job[k].word) + 1);
+        if (!job[k].model[0]) hash = pal_result_input_tree(hash, job[k].word);
     }
     return hash;
 }

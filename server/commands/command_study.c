@@ -184,6 +184,8 @@ static pal_err read_old(study_run *run, pal_diagnostic *diag)
     bool asks = run->row > 0 || run->target.max_error_m > 0 || run->target.budget_ms > 0;
     bool given = q->quick || q->seconds > 0 || q->load_case || q->samples;
     pal_diagnostic reason = {""};
+    if (run->shard.merge && !run->again && !access(run->path, F_OK))
+        return PAL_REFUSE(diag, "%.200s: is there already: --again replaces it, --out keeps it", run->path);
     if (run->row && !exists)
         return PAL_REFUSE(diag, "--pick %d: there is no %.200s yet: run palpate study %.200s", run->row, run->path,
                           q->word);
@@ -664,7 +666,8 @@ int command_study(int argc, char **argv)
         {"--quick", NULL, PAL_FLAG_SWITCH, &run.request.quick, 0, 0, "few configurations and a coarser reference"},
         {"--out", "FOLDER", PAL_FLAG_TEXT, &run.folder, 0, 0, "folder of the study's files (beside the scene)"},
         PAL_SHARD_FLAGS(run.shard, "configuration"),
-        {"--again", NULL, PAL_FLAG_SWITCH, &run.again, 0, 0, "start over instead of continuing"},
+        {"--again", NULL, PAL_FLAG_SWITCH, &run.again, 0, 0,
+         "start over instead of continuing; with --merge, replace a study that is there"},
         {"--units", "UNIT", PAL_FLAG_TEXT, &unit, 0, 0, "unit of a surface file: m, cm, mm, um, in (guessed)"},
     };
     const pal_flag_table table = {.usage = "study SCENE|PROBLEM.json [flags]",
@@ -683,8 +686,7 @@ int command_study(int argc, char **argv)
     if (pal_shard_flags_check(&run.shard, &diag)) return pal_flags_wrong(&run.common, "%s", diag.text);
     if (run.shard.shard && (within || budget || run.row || run.folder || run.again))
         return pal_flags_wrong(&run.common, "--shard: does not go with --within, --budget, --pick, --out and --again");
-    if (run.shard.merge && (run.row || run.again))
-        return pal_flags_wrong(&run.common, "--merge: does not go with --pick and --again");
+    if (run.shard.merge && run.row) return pal_flags_wrong(&run.common, "--merge: does not go with --pick");
     surface.unit_m = unit ? pal_mesh_unit_named(unit) : 0;
     if (unit && surface.unit_m == 0)
         return pal_flags_wrong(&run.common, "--units: \"%.40s\" is not m, cm, mm, um or in", unit);

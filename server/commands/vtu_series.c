@@ -79,16 +79,15 @@ static pal_err write_body(const pal_vtu_series *s, const char *file, const pal_w
     return err;
 }
 
-pal_err pal_vtu_series_step(pal_vtu_series *s, const pal_world *world, pal_diagnostic *diag)
+pal_err pal_vtu_series_step(pal_vtu_series *s, const pal_world *world, double now_s, pal_diagnostic *diag)
 {
-    const double now = pal_world_time_s(world);
     char name[PAL_NAME], file[PAL_NAME + 40];
     /* a rounding of the sum of steps does not delay a moment by a step */
-    if (now < s->next_s - 1e-9) return PAL_ERR_OK;
+    if (now_s < s->next_s - 1e-9) return PAL_ERR_OK;
     if (s->n_moment == 0) PAL_TRY(pal_scene_make_folder(s->folder, diag));
     if (!s->to && !(s->to = open_memstream(&s->list, &s->n_byte)))
         return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for its list", s->folder);
-    while (s->next_s <= now + 1e-9) s->next_s += s->period_s;
+    while (s->next_s <= now_s + 1e-9) s->next_s += s->period_s;
     for (int k = 0; k < pal_world_body_count(world); k++) {
         const pal_body *b = pal_world_view_body(world, k);
         if (!b->element && (!b->tets || b->tets->n_tet == 0)) continue;
@@ -96,7 +95,7 @@ pal_err pal_vtu_series_step(pal_vtu_series *s, const pal_world *world, pal_diagn
         pal_scene_plain_name(b->name, "body", name);
         snprintf(file, sizeof file, "%s_%d_%06d.vtu", name, k + 1, s->n_moment);
         PAL_TRY(write_body(s, file, world, b, diag));
-        fprintf(s->to, "<DataSet timestep=\"%.9g\" part=\"%d\" name=\"%s\" file=\"%s\"/>\n", now, k, name, file);
+        fprintf(s->to, "<DataSet timestep=\"%.9g\" part=\"%d\" name=\"%s\" file=\"%s\"/>\n", now_s, k, name, file);
         s->n_file++;
     }
     s->n_moment++;

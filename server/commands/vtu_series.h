@@ -15,16 +15,16 @@
 typedef struct pal_vtu_series {
     const char *folder; /* borrowed; made at the first moment */
     double period_s;    /* between two moments */
-    double next_s;      /* simulated time of the next one */
+    double next_s;      /* time of the next one */
     int n_moment, n_file;
     FILE *to;   /* appends to the list; NULL: not begun */
     char *list; /* lines of series.pvd */
     size_t n_byte;
 } pal_vtu_series;
 
-/* Writes a moment when its time has come. Zero the struct and set folder and period_s before the first one. Errors: IO,
- * MEMORY. */
-pal_err pal_vtu_series_step(pal_vtu_series *series, const pal_world *world, pal_diagnostic *diag);
+/* Writes a moment when its time has come. now_s: since the start of the recording, which a reset of the world does not
+ * set back. Zero the struct and set folder and period_s before the first one. Errors: IO, MEMORY. */
+pal_err pal_vtu_series_step(pal_vtu_series *series, const pal_world *world, double now_s, pal_diagnostic *diag);
 /* Writes series.pvd. Errors: REFUSED: no body had elements; IO. */
 pal_err pal_vtu_series_end(pal_vtu_series *series, pal_diagnostic *diag);
 void pal_vtu_series_free(pal_vtu_series *series);

@@ -32,9 +32,11 @@ void pal_scene_show_images(pal_loaded_scene *scene, int index);
 
 /* how a bare surface or label volume is turned into a scene */
 typedef struct pal_surface_scene {
-    double unit_m;         /* 0: guess                                            */
-    int resolution;        /* 0: about 13,000 tetrahedra; fem: about 2,500 nodes  */
-    int label;             /* of a label volume; < 0: the most frequent           */
+    double unit_m;  /* 0: guess                                            */
+    int resolution; /* 0: about 13,000 tetrahedra; fem: about 2,500 nodes  */
+    int label;      /* of a label volume; < 0: the most frequent           */
+    bool threshold; /* values from low to high of a volume are the body    */
+    int32_t low, high;
     int target_tri;        /* shown triangles of a label volume's surface; 50,000, adaptive 1,500; a surface file that
                             * adapts is made as coarse as that when it is given, or has more than 3,000 */
     pal_material material; /* young_Pa 0: the default material                 */

@@ -15,7 +15,7 @@
 #include "server/mesh/files/mesh_file.h"
 #include "server/mesh/geometry/organ_family.h"
 #include "server/mesh/geometry/procedural.h"
-#include "server/mesh/scan/label_volume.h"
+#include "server/mesh/scan/dicom_series.h"
 #include "server/num/sort.h"
 #include "server/scene/subdivision_file.h"
 #include "server/scene/tuning.h"
@@ -40,8 +40,12 @@ void pal_scene_stem(const char *path, char *out, size_t n_byte)
     static const char *const endings[] = {".gz",  ".nii", ".inr",     ".seg.nrrd", ".nrrd", ".mha",
                                           ".obj", ".stl", ".ply",     ".off",      ".OBJ",  ".STL",
                                           ".PLY", ".OFF", ".palmesh", ".palcells"};
-    const char *slash = strrchr(path, '/');
-    snprintf(out, n_byte, "%s", slash ? slash + 1 : path);
+    /* a folder may end with a slash */
+    size_t end = strlen(path);
+    while (end > 1 && path[end - 1] == '/') end--;
+    size_t begin = end;
+    while (begin > 0 && path[begin - 1] != '/') begin--;
+    snprintf(out, n_byte, "%.*s", (int)(end - begin), path + begin);
     for (size_t k = 0; k < sizeof endings / sizeof endings[0]; k++) {
         size_t n = strlen(out), m = strlen(endings[k]);
         if (n > m && !strcmp(out + n - m, endings[k])) out[n - m] = 0;
@@ -189,15 +193,24 @@ static pal_err read_volume(const char *path, const pal_surface_scene *options, p
 {
     pal_label_volume volume;
     pal_label_count count[LABELS];
-    PAL_TRY(pal_label_volume_read(path, &volume, diag));
+    PAL_TRY(pal_scan_read(path, &volume, diag));
     report_progress(options, "label", 0);
+    if (options->threshold) pal_label_volume_threshold(&volume, options->low, options->high);
     int n = pal_label_volume_list(&volume, count, LABELS);
     snprintf(report->surface.place, sizeof report->surface.place, "byte %lld", (long long)volume.first_byte);
     const bool other = volume.axes[0] && options->axes[0] && strcmp(volume.axes, options->axes) != 0;
     if (!options->axes[0]) snprintf(report->axes, sizeof report->axes, "%s", volume.axes);
-    pal_err err = other ? PAL_REFUSE(diag, "%s: the axes of the scan are %s, not %s", path, volume.axes, options->axes)
-                  : n > 0 ? PAL_ERR_OK
-                          : PAL_REFUSE(diag, "%s: %s: the volume holds no label but 0", path, report->surface.place);
+    /* DICOM holds images rather than labels */
+    const bool image = n == LABELS && !strcmp(volume.format, "dicom") && options->label < 0;
+    pal_err err =
+        other   ? PAL_REFUSE(diag, "%s: the axes of the scan are %s, not %s", path, volume.axes, options->axes)
+        : image ? PAL_REFUSE(diag,
+                             "%s: is no segmentation, its voxels have %d values or more: --threshold LOW,HIGH "
+                             "takes those of a range (CT: Hounsfield units), --label N those of one value",
+                             path, LABELS)
+        : n > 0 ? PAL_ERR_OK
+        : options->threshold ? PAL_REFUSE(diag, "%s: no voxel is within %d to %d", path, options->low, options->high)
+                             : PAL_REFUSE(diag, "%s: %s: the volume holds no label but 0", path, report->surface.place);
     if (!err) {
         int wanted = options->adaptive ? PAL_COARSE_TRI : PAL_WANTED_TRI;
         pal_label_surface_options surface = {
@@ -225,9 +238,10 @@ static pal_err read_any(const char *path, const pal_surface_scene *options, pal_
     snprintf(report->axes, sizeof report->axes, "%s", options->axes);
     /* a pipe or device would be waited for */
     if (stat(path, &facts)) return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s", path, strerror(errno));
-    if (!S_ISREG(facts.st_mode)) return PAL_REFUSE(diag, "%s: not a file", path);
+    const bool folder = S_ISDIR(facts.st_mode);
+    if (!S_ISREG(facts.st_mode) && !folder) return PAL_REFUSE(diag, "%s: not a file", path);
     pal_err err;
-    if (pal_label_volume_is(path)) {
+    if (folder || pal_label_volume_is(path)) {
         if (options->unit_m > 0 && options->unit_m != 1e-3)
             return PAL_REFUSE(diag, "%s: a scan is in mm, no other unit can be given", path);
         report->unit_m = 1e-3;
@@ -235,6 +249,8 @@ static pal_err read_any(const char *path, const pal_surface_scene *options, pal_
         err = read_volume(path, options, out, report, diag);
     } else if (options->label > 0) {
         err = PAL_REFUSE(diag, "%s: label %d is wanted, but this is not a label volume", path, options->label);
+    } else if (options->threshold) {
+        err = PAL_REFUSE(diag, "%s: a threshold is given, but this is not a volume", path);
     } else {
         pal_mesh_file_options file = {.unit_m = options->unit_m, .weld = PAL_MESH_WELD, .image = options->image};
         report->unit_guessed = options->unit_m == 0;

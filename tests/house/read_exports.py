@@ -3,10 +3,13 @@
 usage: read_exports.py solution FILE.vtu FILE.csv      points and displacements are those of the CSV, to the bit
        read_exports.py series FOLDER YOUNG_PA          a series.pvd of one body: times ascend, rest shape and E stay
        read_exports.py ball FILE.mha                   writes a label volume, prints its volume in m^3
-Prints one line for each fault; exit code 1 when there is one, 77 without VTK (python3-vtk9).
+       read_exports.py points FOLDER SECONDS           prints the points of that moment of a series as JSON
+       read_exports.py surface FILE.vtp                prints points and triangles as JSON
+Prints one line for each fault on stderr; exit code 1 when there is one, 77 without VTK (python3-vtk9).
 """
 
 import csv
+import json
 import sys
 import xml.etree.ElementTree
 
@@ -14,7 +17,7 @@ try:
     from vtkmodules.vtkCommonDataModel import vtkImageData
     from vtkmodules.vtkFiltersVerdict import vtkCellSizeFilter
     from vtkmodules.vtkIOImage import vtkMetaImageWriter
-    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridReader
 except ImportError:
     sys.exit(77)
 
@@ -76,6 +79,36 @@ def series(folder, young_pa):
             yield f"time {time}: a cell is turned inside out"
 
 
+def points(folder, seconds):
+    for one in xml.etree.ElementTree.parse(f"{folder}/series.pvd").findall("./Collection/DataSet"):
+        if abs(float(one.get("timestep")) - seconds) < 1e-9:
+            grid = read(f"{folder}/{one.get('file')}")
+            print(json.dumps({"points": [grid.GetPoint(i) for i in range(grid.GetNumberOfPoints())]}))
+            return
+    yield f"no moment at {seconds} s"
+
+
+def surface(path):
+    reader = vtkXMLPolyDataReader()
+    reader.SetFileName(path)
+    reader.Update()
+    grid = reader.GetOutput()
+    moved = grid.GetPointData().GetArray("displacement_m")
+    body = grid.GetCellData().GetArray("body")
+    places = [grid.GetPoint(i) for i in range(grid.GetNumberOfPoints())]
+    cells = []
+    for k in range(grid.GetNumberOfCells()):
+        ids = grid.GetCell(k).GetPointIds()
+        cells.append([ids.GetId(c) for c in range(ids.GetNumberOfIds())])
+    print(json.dumps({"points": places, "triangles": cells}))
+    if any(len(cell) != 3 for cell in cells):
+        yield "a cell is no triangle"
+    if body.GetRange() != (1, 1):
+        yield f"bodies {body.GetRange()}"
+    if not 0 < moved.GetMaxNorm() < 1:
+        yield f"the largest displacement is {moved.GetMaxNorm()} m"
+
+
 def ball(path):
     size, step = (30, 24, 20), (1.0, 1.5, 2.0)
     image = vtkImageData()
@@ -99,14 +132,14 @@ def ball(path):
     return []
 
 
-kind = sys.argv[1]
-faults = list(
-    solution(*sys.argv[2:4])
-    if kind == "solution"
-    else series(sys.argv[2], float(sys.argv[3]))
-    if kind == "series"
-    else ball(sys.argv[2])
-)
+kinds = {
+    "solution": solution,
+    "series": lambda folder, young_pa: series(folder, float(young_pa)),
+    "points": lambda folder, seconds: points(folder, float(seconds)),
+    "surface": surface,
+    "ball": ball,
+}
+faults = list(kinds[sys.argv[1]](*sys.argv[2:]))
 for fault in faults[:10]:
-    print(fault)
+    print(fault, file=sys.stderr)
 sys.exit(1 if faults else 0)

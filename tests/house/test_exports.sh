@@ -1,10 +1,14 @@
 #!/bin/sh
-# Files for and from other tools, read and written by VTK's own Python modules: VTU of a solution, a VTU series of a
-# recording, a MetaImage volume in. Prints "N passed, N failed, N skipped"; exit 1 when a check failed.
-# usage: test_exports.sh PALPATE
+# Files for and from other tools, read and written by VTK's own Python modules and by three.js: VTU of a solution, a VTU
+# series of a recording, VTP and glTF of a moment, a MetaImage volume in. Prints "N passed, N failed, N skipped"; exit 1
+# when a check failed.
+# usage: test_exports.sh PALPATE PACKAGES (folder with node_modules of the viewer)
 set -u
 palpate=$(realpath "$1")
-reader=$(realpath "$(dirname "$0")")/read_exports.py
+here=$(realpath "$(dirname "$0")")
+reader=$here/read_exports.py
+packages=$(realpath -m "$2")
+gltf_reads() { node "$here/read_gltf.mjs" "$packages" "$@"; }
 . "$(dirname "$0")/shell.sh"
 run() {
     timeout 100 "$palpate" "$@" >out 2>err </dev/null
@@ -19,6 +23,10 @@ if [ $? -ne 0 ]; then
     exit
 fi
 reads() { "$python" "$reader" "$@"; }
+if [ ! -e "$packages/node_modules/three/examples/jsm/loaders/GLTFLoader.js" ]; then
+    skip "glTF read by three.js" "the packages of the viewer are not in $packages"
+    gltf_reads() { true; }
+fi
 
 begin "a solution as VTU has the points and displacements of its CSV"
 run solve "$problems/beam.json" --case tip --resolution 12 --vtk tip.vtu --csv tip.csv
@@ -31,7 +39,8 @@ run prepare --procedural --resolution 8 --model fem -o organ
 check "exit code $code of prepare" code_is 0
 young=$(sed -n 's/.*"young_Pa":[[:space:]]*\([0-9.e+]*\).*/\1/p' organ/scene.json | head -n 1)
 # the name of a body is any text: no file may leave the folder, and none of XML's signs its place
-sed '/"bodies"/,$ s/"name":[[:space:]]*"organ"/"name": "..\/..\/escape <\&\x27>"/' organ/scene.json >organ/named.json
+sed '/"bodies"/,$ s/"name":[[:space:]]*"organ"/"name": "..\/..\/escape <\&\x27>"/
+    s/"skin_output"/"surface_output"/' organ/scene.json >organ/named.json
 check "the body has a name with a path" grep -q '"../../escape' organ/named.json
 mv organ/named.json organ/scene.json
 run serve organ/scene.json --record organ.log --port 0 --seconds 0.5
@@ -43,11 +52,53 @@ check "VTK reads another body" reads series series "$young"
 check "the folder has all files" test "$(ls series/*escape*_1_000000.vtu | wc -l)" = 1
 end
 
-begin "a recording of a surface has no elements to write"
+begin "glTF of a moment has the vertices of the series then"
+# nodes are shown, so that the surface needs no interpolation
+run replay organ.log organ/scene.json --vtu moments --rate 10 --gltf moment.glb --at 0.2
+check "exit code $code" code_is 0
+check "it says when" has out 'wrote moment.glb, the surfaces at 0.2 s'
+reads points moments 0.2 >points.json
+check "another reader finds other vertices" gltf_reads points moment.glb points.json
+run replay organ.log organ/scene.json --gltf moment.glb --at 100
+refused 1 '--at: 100 s: the recording ends at [0-9.]* s'
+run replay organ.log organ/scene.json --at 0.1
+refused 2 '--at: goes with --gltf or --vtp'
+check "colours are not those of the page" gltf_reads colours \
+    "$here/../../server/commands/shown_moment.c" "$here/../../clients/viewer/src/tissue_looks.js"
+end
+
+begin "an adaptive surface as glTF and VTP"
 run prepare --procedural --model adaptive -o thin
 run serve thin/scene.json --record thin.log --port 0 --seconds 0.3
+run replay thin.log thin/scene.json --gltf thin.glb --vtp thin.vtp
+check "exit code $code" code_is 0
+reads surface thin.vtp >thin.json
+check "VTK reads another surface" [ $? -eq 0 ]
+check "glTF has another surface" gltf_reads surface thin.glb thin.json
 run replay thin.log thin/scene.json --vtu nothing
 refused 1 'no body of the scene has elements of volume'
+end
+
+begin "images of a surface are textures of glTF"
+png() { # png PIXELS: the beginning of a PNG of one line, enough for a program that decodes none
+    printf "\\211PNG\\r\\n\\032\\n\\0\\0\\0\\rIHDR\\0\\0\\0\\00$1\\0\\0\\0\\001\\010\\002\\0\\0\\0\\0\\0\\0\\0"
+}
+png 2 >skin.png
+png 3 >lid.png
+printf 'newmtl skin\nmap_Kd skin.png\nnewmtl lid\nmap_Kd lid.png\n' >box.mtl
+{
+    printf 'mtllib box.mtl\nv 0 0 0\nv 80 0 0\nv 80 60 0\nv 0 60 0\nv 0 0 40\nv 80 0 40\nv 80 60 40\nv 0 60 40\n'
+    printf 'vt 0 0\nvt 1 0\nvt 1 0.75\nvt 0 0.75\nusemtl skin\nf 1/1 4/2 3/3 2/4\nf 1/1 2/2 6/3 5/4\n'
+    printf 'f 2/1 3/2 7/3 6/4\nf 3/1 4/2 8/3 7/4\nf 4/1 1/2 5/3 8/4\nusemtl lid\nf 5/1 6/2 7/3 8/4\n'
+} >box.obj
+run prepare box.obj -o box --units mm --resolution 6 --model fem
+check "exit code $code of prepare" code_is 0
+sed 's/"gravity_m_s2":[^,]*,/"gravity_m_s2": 0,/; s/{"name":[[:space:]]*"gravity"},//' box/scene.json >box/still.json
+run serve box/still.json --record box.log --port 0 --seconds 0.1
+check "exit code $code of serve" code_is 0
+run replay box.log box/still.json --gltf box.glb
+check "exit code $code of replay" code_is 0
+check "faces have other places or images" gltf_reads box box.glb box.obj 80 60 40
 end
 
 begin "a compressed MetaImage of VTK has its ball"

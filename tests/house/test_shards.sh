@@ -120,6 +120,16 @@ check "their lines stand as before" [ "$(head -n $((n - 1)) before)" = "$(head -
 run $beam --merge parts --out two
 check "exit code $code of the merge" code_is 0
 check "the merged study has other figures" points_equal one/study.json two/study.json
+cp two/study.json merged.json
+run $beam --merge parts --out two
+refused 1 'two/study.json: is there already: --again replaces it, --out keeps it'
+check "a refused merge changed the study" same two/study.json merged.json
+run $beam --merge parts --out two --again
+check "exit code $code of the merge with --again" code_is 0
+cp -r parts mixed
+sed 's/"machine":"[^"]*"/"machine":"another"/' parts/study-2-of-2.jsonl >mixed/study-2-of-2.jsonl
+run $beam --merge mixed --out three
+refused 1 'was measured on another processor, another, whose times do not compare'
 check "a page" has two/study.html "</html>"
 run study "$problems/beam.json" --case tip --quick --methods fem --seconds 0.06 --merge parts --out three
 refused 1 'the results belong to other input'
@@ -143,6 +153,50 @@ check "exit code $code of the merge" code_is 0
 timed out >merged_table
 check "the merged table has other figures" same whole_table merged_table
 run $table --nu 0.3 --merge rows
+refused 1 'the results belong to other input'
+end
+
+searches="calibrate $problems/bar.json --case bend --resolution 8 --split 1 --method annealing --evaluations 30 --starts 3 --seed 7"
+fits_equal() { # fits_equal A B: the scene, its mesh and the trajectory, to the bit
+    same "$1/fit.json" "$2/fit.json" && same "$1/fit.palmesh" "$2/fit.palmesh" && same "$1/t.svg" "$2/t.svg"
+}
+
+begin "calibrate: two shards, one of which died, equal one run"
+run $searches -o fit_whole/fit.json --trajectory fit_whole/t.svg --json
+check "exit code $code" code_is 0
+check "it does not tell which search is the best" has out '"starts":3,"seed":[789][,}]'
+for i in 1 2; do
+    run $searches --shard $i/2 --results fits
+    check "exit code $code of shard $i" code_is 0
+done
+check "shard 1 has its head and 2 of 3 searches" lines_are fits/calibrate-1-of-2.jsonl 3
+cp fits/calibrate-1-of-2.jsonl before
+head -c -50 before >fits/calibrate-1-of-2.jsonl
+run $searches --merge fits -o fit_merged/fit.json
+refused 1 'shard 1 of 2 is unfinished: result 2 is missing'
+run $searches --shard 1/2 --results fits
+check "it kept its first search" has out 'shard 1 of 2: 2 results are in fits, 1 of them from before'
+check "whose line stands as before" [ "$(head -n 2 before)" = "$(head -n 2 fits/calibrate-1-of-2.jsonl)" ]
+run $searches --merge fits -o fit_merged/fit.json --trajectory fit_merged/t.svg --json
+check "exit code $code of the merge" code_is 0
+check "the merged fit is not that of one run" fits_equal fit_whole fit_merged
+run $searches --decades 2 --merge fits -o other/fit.json
+refused 1 'the results belong to other input'
+run $searches --shard 1/2 --results fits -o fit_merged/fit.json
+refused 2 'does not go with files to write'
+run calibrate "$problems/bar.json" --case bend --starts 2 -o other/fit.json
+refused 2 'adjoint is one search without a seed'
+end
+
+begin "shards of a scene whose mesh has changed are refused"
+run prepare --procedural --resolution 6 --model fem -o meshed
+run robustness meshed/scene.json --only inside --seconds 60 --shard 1/1 --results mesh_results
+check "exit code $code" code_is 0
+run robustness meshed/scene.json --only inside --seconds 60 --merge mesh_results
+check "exit code $code of the merge" code_is 0
+run prepare --procedural --resolution 7 --model fem -o finer
+cp finer/organ.palmesh meshed/organ.palmesh
+run robustness meshed/scene.json --only inside --seconds 60 --merge mesh_results
 refused 1 'the results belong to other input'
 end
 

@@ -1,4 +1,4 @@
-/* Legacy VTK, version 3.0, and XML, version 1.0, both ASCII (VTK User's Guide, "VTK File Formats").
+/* Legacy VTK, version 3.0, and XML, version 1.0, all ASCII (VTK User's Guide, "VTK File Formats").
  *
  * VTK goes around the lower face of a hexahedron and then around the upper one, so corners 2 and 3, 6 and 7 change
  * places; its quadratic tetrahedron has the middles of edges 01 12 20 03 13 23, as num/shape_functions.h has. */
@@ -112,9 +112,8 @@ static void write_arrays(FILE *file, const char *where, const pal_vtk_field *fie
     fprintf(file, "</%s>\n", where);
 }
 
-static void write_cell_arrays(FILE *file, const pal_vtk_grid *g)
+static void write_connectivity(FILE *file, const pal_vtk_grid *g)
 {
-    fputs("<Cells>\n", file);
     begin_array(file, "Int32", "connectivity", 1);
     for (size_t e = 0; e < (size_t)g->n_element; e++)
         for (int c = 0; c < g->n_corner; c++)
@@ -124,31 +123,51 @@ static void write_cell_arrays(FILE *file, const pal_vtk_grid *g)
     begin_array(file, "Int64", "offsets", 1);
     for (int e = 1; e <= g->n_element; e++) fprintf(file, "%lld\n", (long long)e * g->n_corner);
     end_array(file);
+}
+
+static void write_cell_types(FILE *file, const pal_vtk_grid *g)
+{
     begin_array(file, "UInt8", "types", 1);
     for (int e = 0; e < g->n_element; e++) fprintf(file, "%d\n", cell_type(g->n_corner));
     end_array(file);
-    fputs("</Cells>\n", file);
 }
 
-pal_err pal_mesh_write_vtu(const char *path, const pal_vtk_grid *g, pal_diagnostic *diag)
+/* cells: "Cells" with types, or "Polys" without */
+static pal_err write_xml(const char *path, const char *type, const char *cells, const pal_vtk_grid *g,
+                         pal_diagnostic *diag)
 {
     pal_file_out out;
-    PAL_TRY(check_grid(g, path, diag));
     PAL_TRY(pal_file_begin(&out, path, diag));
     fprintf(out.file,
-            "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" "
-            "header_type=\"UInt64\">\n<UnstructuredGrid>\n<Piece NumberOfPoints=\"%d\" NumberOfCells=\"%d\">\n",
-            g->n_node, g->n_element);
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"%s\" version=\"1.0\" byte_order=\"LittleEndian\" "
+            "header_type=\"UInt64\">\n<%s>\n<Piece NumberOfPoints=\"%d\" NumberOf%s=\"%d\">\n",
+            type, type, g->n_node, cells, g->n_element);
     fputs("<Points>\n", out.file);
     begin_array(out.file, "Float64", "Points", 3);
     write_points(out.file, g);
     end_array(out.file);
-    fputs("</Points>\n", out.file);
-    write_cell_arrays(out.file, g);
+    fprintf(out.file, "</Points>\n<%s>\n", cells);
+    write_connectivity(out.file, g);
+    if (!strcmp(cells, "Cells")) write_cell_types(out.file, g);
+    fprintf(out.file, "</%s>\n", cells);
     write_arrays(out.file, "PointData", g->point, g->n_point, g->n_node);
     write_arrays(out.file, "CellData", g->cell, g->n_cell, g->n_element);
-    fputs("</Piece>\n</UnstructuredGrid>\n</VTKFile>\n", out.file);
+    fprintf(out.file, "</Piece>\n</%s>\n</VTKFile>\n", type);
     return pal_file_end(&out, diag);
+}
+
+pal_err pal_mesh_write_vtu(const char *path, const pal_vtk_grid *g, pal_diagnostic *diag)
+{
+    PAL_TRY(check_grid(g, path, diag));
+    return write_xml(path, "UnstructuredGrid", "Cells", g, diag);
+}
+
+pal_err pal_mesh_write_vtp(const char *path, const pal_vtk_grid *g, pal_diagnostic *diag)
+{
+    if (g->n_corner != 3) return PAL_REFUSE(diag, "%s: elements of %d corners, not triangles", path, g->n_corner);
+    PAL_TRY(check_fields(g->point, g->n_point, path, diag));
+    PAL_TRY(check_fields(g->cell, g->n_cell, path, diag));
+    return write_xml(path, "PolyData", "Polys", g, diag);
 }
 
 /* ---- legacy ---- */

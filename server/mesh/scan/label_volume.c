@@ -414,6 +414,12 @@ void pal_label_volume_free(pal_label_volume *volume)
     memset(volume, 0, sizeof *volume);
 }
 
+void pal_label_volume_threshold(pal_label_volume *volume, int32_t low, int32_t high)
+{
+    const int64_t n = (int64_t)volume->n[0] * volume->n[1] * volume->n[2];
+    for (int64_t i = 0; i < n; i++) volume->label[i] = volume->label[i] >= low && volume->label[i] <= high;
+}
+
 bool pal_label_volume_is(const char *path)
 {
     static const char *const tail[] = {".nii", ".nii.gz", ".inr", ".inr.gz", ".nrrd", ".mha"};

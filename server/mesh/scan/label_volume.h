@@ -15,7 +15,7 @@ typedef struct pal_label_volume {
     double to_m[12];    /* 3x4 row-major: metres = to_m (i, j, k, 1), voxel centres */
     int32_t *label;     /* [n2][n1][n0]; non-integer voxels are rounded          */
     int64_t first_byte; /* of the voxels in the file, or in what is unpacked   */
-    char format[16];    /* "nifti" | "inr" | "nrrd" | "metaimage"            */
+    char format[16];    /* "nifti" | "inr" | "nrrd" | "metaimage" | "dicom"  */
     char axes[4];       /* where x, y and z in metres point in the patient: "RAS" where the file states it; "":
                            not known */
 } pal_label_volume;
@@ -24,6 +24,8 @@ pal_err pal_label_volume_read(const char *path, pal_label_volume *out, pal_diagn
 pal_err pal_label_volume_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_label_volume *out,
                                pal_diagnostic *diag);
 void pal_label_volume_free(pal_label_volume *volume);
+/* label 1 where the value is within low .. high, else 0 */
+void pal_label_volume_threshold(pal_label_volume *volume, int32_t low, int32_t high);
 /* does the name or content of this file look like a label volume? (to choose the reader) */
 bool pal_label_volume_is(const char *path);
 

@@ -54,6 +54,9 @@ pal_err pal_rest_stiffness_find(const pal_system *system, pal_arena *arena, pal_
     }
     memset(body->g, 0, pal_body_bytes3(body));
     memset(body->f, 0, 3 * sizeof(double) * (size_t)body->n_node);
+    /* forces leave traces in what components keep from one to the next: a new world equals a reset one */
+    for (int i = 0; i < system->n_force; i++)
+        if (system->force[i].effect->reset) system->force[i].effect->reset(system->force[i].self, body);
     return PAL_ERR_OK;
 }
 
