@@ -55,11 +55,14 @@ static bool keep_to_one_core(cpu_set_t *before)
     return !sched_setaffinity(0, sizeof one, &one);
 }
 
-/* a tool at the top of the organ that holds it from the start and goes to and fro by a tenth of its length */
+/* a mouse with a tool at the top of the organ that holds it from the start and goes to and fro by a tenth of its length
+ */
 static void pull(member *m, int turn, double time_s)
 {
     const double *low = m->low_m, *high = m->high_m, reach = 0.1 * (high[0] - low[0]);
-    pal_pose pose = {.quat = {1, 0, 0, 0}, .seq = (uint32_t)turn + 1, .buttons = turn > 3};
+    pal_pose pose = {.quat = {1, 0, 0, 0},
+                     .seq = (uint32_t)turn + 1,
+                     .buttons = PAL_POSE_NO_HAPTICS | (turn > 3 ? PAL_POSE_GRASP : 0)};
     for (int c = 0; c < 2; c++) pose.position_m[c] = 0.5 * (low[c] + high[c]);
     pose.position_m[0] += turn > 3 ? reach * sin(3 * time_s) : 0;
     pose.position_m[2] = high[2];

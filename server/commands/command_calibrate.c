@@ -622,9 +622,9 @@ int command_calibrate(int argc, char **argv)
                    "palpate calibrate deploy/problems/cube.json --case push --grid 3x3x3 "
                    "--resolution 6 --budget 5 --picture cube.svg -o cube.json\n"
                    "palpate prepare --procedural -o organ\n"
-                   "palpate serve organ/scene.json --open --record pull.log --port 8390 --seconds 6 & "
-                   "sleep 1; palpate-client ws://127.0.0.1:8390/ws --script pull --seconds 4; "
-                   "wait\n"
+                   "palpate serve organ/scene.json --open --record pull.log --port 8390 & "
+                   "until palpate-client ws://127.0.0.1:8390/ws --script pull --seconds 60 "
+                   "--until moved_mm=10; do sleep 0.2; done; kill $!; wait\n"
                    "palpate calibrate organ/scene.json --from pull.log --resolution 12 --split 1 "
                    "--budget 10 -o fitted.json\n",
         PAL_FLAGS(flag),
