@@ -302,8 +302,8 @@ static void slow_steps_have_more_states(void)
     const uint64_t n_step = pal_recording_step(slow, 1e9);
     CHECK(n_step >= 120);
     CHECK_LE(n_step / 20, pal_recording_states(slow));
-    /* of the quick steps: at the beginning, and after each change */
-    CHECK_INT(pal_recording_states(recording), 5);
+    /* of the quick steps: at the beginning, after each change, and at the end */
+    CHECK_INT(pal_recording_states(recording), 6);
     pal_recording_close(slow);
     unlink(slow_path);
 }
