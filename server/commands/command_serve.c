@@ -170,6 +170,7 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
                                   .open = run->config.open,
                                   .key_file = run->config.keys,
                                   .viewer_folder = viewer_folder(&run->config, folder, sizeof folder),
+                                  .drain_to = run->config.drain_to,
                                   .error_m = run->config.error_m,
                                   .max_clients = run->config.max_clients,
                                   .max_viewers = run->config.max_viewers,

@@ -37,4 +37,7 @@ void pal_server_close(pal_server *server);            /* [load] */
  * thread is [net]. */
 struct pal_transport *pal_server_transport(pal_server *server);
 void pal_server_advance(pal_server *server);
+/* what pal_server_run does at its end: completes recordings and tells members where to go; drops them (hub.h) */
+void pal_server_drain(pal_server *server);
+void pal_server_goodbye(pal_server *server);
 #endif
