@@ -450,7 +450,7 @@ void pal_hub_drain(pal_hub *hub)
         for (pal_client *c = NULL; (c = pal_hub_next_member(hub->room[r], c));)
             if (c->moves) send_move(c), n_sent++;
     if (hub->drain_to[0])
-        pal_log(PAL_LOG_INFO, "drain", "%d sessions end, %d members are sent to %s", hub->n_room, n_sent,
+        pal_log(PAL_LOG_INFO, "drain", "%d sessions end, %d clients are sent to %s", hub->n_room, n_sent,
                 hub->drain_to);
 }
 

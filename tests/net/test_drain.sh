@@ -16,6 +16,10 @@ ends() { # ends SIGNAL: the server's exit code
     code=$?
     cat "$work/serve.err" >>"$work/lives.err"
 }
+watch_relay() { # until somebody who watches through the relay has seen 20 cycles
+    timeout 100 "$bin/palpate-client" "ws://127.0.0.1:$(json port "$work/relay.out")/ws" --tool none --script idle --seconds 60 --until cycles=20 \
+        --quiet 2>"$work/viewer.err"
+}
 
 second=$(free_port)
 life 0 --drain-to "http://127.0.0.1:$second/"
@@ -24,10 +28,15 @@ timeout 250 "$bin/palpate-client" "$url" --json --clients 4 --script press --sec
 clients=$!
 pids="$pids $clients"
 members 4
+timeout 250 "$bin/palpate" relay "$url" --port 0 --json >"$work/relay.out" 2>"$work/relay.err" &
+relay=$!
+pids="$pids $relay"
+shows "$work/relay.out" $relay '"port"'
+watch_relay
 ends TERM
 check "a server that is drained ends with 0" $code == 0
-# the fifth is the one that has counted them, if it is still there
-check "four members were sent on" "$(grep -c '1 sessions end, [45] members are sent to http://127.0.0.1' "$work/serve.err")" == 1
+# two more are the relay, and the one that has counted them if it is still there
+check "four members and the relay were sent on" "$(grep -c '1 sessions end, [56] clients are sent to http://127.0.0.1' "$work/serve.err")" == 1
 "$bin/palpate" replay "$work/run.log" "$work/ball.json" --strict --json >"$work/replay" 2>"$work/replay.err"
 check "its recording is whole, and its replay equal" $? == 0
 check "it has steps" "$(json steps "$work/replay")" '>' 10
@@ -35,6 +44,8 @@ check "it has steps" "$(json steps "$work/replay")" '>' 10
 life "$second"
 members 4
 check "another goes on with it" "$(grep -c 'ball goes on where .*run.log ends' "$work/serve.err")" == 1
+watch_relay
+check "so does the relay, for who watches there" $? == 0
 ends KILL
 life "$second"
 wait $clients
