@@ -321,11 +321,28 @@ static void judge_tier(pal_client *c, uint64_t now)
     }
 }
 
+static void beat(pal_hub *hub)
+{
+    int n_client = 0;
+    for (const pal_client *c = hub->client; c < hub->client + hub->max_clients; c++) n_client += c->peer && c->id;
+    atomic_store(&hub->pulse.n_session, hub->n_room);
+    atomic_store(&hub->pulse.n_client, n_client);
+    if (pal_hub_is_alive(hub)) atomic_store(&hub->pulse.alive_ns, pal_clock_ns());
+}
+
+pal_hub_pulse pal_hub_read_pulse(const pal_hub *hub)
+{
+    return (pal_hub_pulse){.alive = pal_clock_ns() - atomic_load(&hub->pulse.alive_ns) < PAL_PULSE_NS,
+                           .n_session = atomic_load(&hub->pulse.n_session),
+                           .n_client = atomic_load(&hub->pulse.n_client)};
+}
+
 static void hub_tick(void *user)
 {
     pal_hub *hub = user;
     uint64_t now = pal_loop_now_ns(hub->loop);
     if (hub->leaving) return;
+    beat(hub);
     hub_wake(hub);
     pal_hub_hand_over_idle_tools(hub);
     for (int r = 0; r < hub->n_room; r++) {

@@ -47,6 +47,12 @@ void pal_hub_events(pal_hub *hub, pal_peer_events *out); /* for pal_transport_op
 void pal_hub_drain(pal_hub *hub);
 bool pal_hub_moves_sent(const pal_hub *hub); /* nobody's `move` waits for its transport */
 void pal_hub_goodbye(pal_hub *hub);          /* drops every peer with code 1001 */
+/* what other threads may know of it, as of the last tick */
+typedef struct pal_hub_pulse {
+    bool alive; /* every simulation steps, and the loop has turned within PAL_PULSE_NS */
+    int n_session, n_client;
+} pal_hub_pulse;
+pal_hub_pulse pal_hub_read_pulse(const pal_hub *hub); /* [any] */
 /* a ticket for who has started the server (admission.h). [load] */
 void pal_hub_start_ticket(const pal_hub *hub, pal_wire_role role, char text[PAL_TICKET_TEXT]);
 int pal_hub_record_error(const pal_hub *hub); /* errno of a recording that has ended; 0: none */

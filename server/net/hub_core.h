@@ -216,6 +216,10 @@ struct pal_hub {
     const pal_verb *verb;              /* known commands [n_verb], borrowed */
     int n_verb;
     double error_m;
+    struct {
+        _Atomic uint64_t alive_ns; /* when all was alive */
+        _Atomic int n_session, n_client;
+    } pulse;              /* written at each tick, read by any thread */
     const char *drain_to; /* "": nowhere */
     pal_site *site;
     pal_admission *admission;

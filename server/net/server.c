@@ -162,6 +162,11 @@ bool pal_server_has_ended(const pal_server *server, int i)
     return pal_hub_has_ended(server->hub, i);
 }
 
+pal_hub_pulse pal_server_pulse(const pal_server *server)
+{
+    return pal_hub_read_pulse(server->hub);
+}
+
 int pal_server_port(const pal_server *server)
 {
     return server->address.port;
