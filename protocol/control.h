@@ -29,6 +29,7 @@
 #define PAL_WIRE_REASON_BYTES  128
 #define PAL_WIRE_LABEL_BYTES   120
 #define PAL_WIRE_METHOD_BYTES  32
+#define PAL_WIRE_TICKET_BYTES  84
 #define PAL_WIRE_MARK_MAX      64  /* marks of a recording */
 #define PAL_WIRE_POINT_MAX     128 /* points of a study that are sent; a point's own index may be larger */
 #define PAL_WIRE_NEIGHBOUR_MAX 8
@@ -47,6 +48,7 @@
     X(ANSWER, "answer", true)              /* result of a command: done, or the requested numbers             */       \
     X(STUDY, "study", true)                /* cost and error of other configurations; to subscribers of `estimate` */  \
     X(ESTIMATE, "estimate", true)          /* 2-4 Hz: cost and error of a body now; to the same                    */  \
+    X(MOVE, "move", true)                  /* the session goes on at another address                          */       \
     X(JOIN, "join", false)                 /* first message of a client                                       */       \
     X(COMMAND, "command", false)           /* pause, resume, step, reset, material ...                        */       \
     X(TAKE_TOOL, "take_tool", false)       /* take a tool                                                     */       \
@@ -263,12 +265,21 @@ typedef struct pal_wire_error {
     char text[PAL_WIRE_TEXT_BYTES]; /* one sentence for people                              */
 } pal_wire_error;
 
+/* where the session goes on: the client goes there when its connection ends (protocol/README.md, "Moving") */
+typedef struct pal_wire_move {
+    char address[PAL_WIRE_TEXT_BYTES]; /* "https://host:port/", as a browser opens it */
+    char session[PAL_WIRE_NAME_BYTES];
+    char ticket[PAL_WIRE_TICKET_BYTES]; /* in place of the client's own, which has expired or will; "": its own, and not
+                                           on the wire */
+} pal_wire_move;
+
 typedef struct pal_wire_join {
     char name[PAL_WIRE_MEMBER_NAME];
     pal_wire_role role;
     int tool;             /* wanted: index, PAL_WIRE_TOOL_ANY or PAL_WIRE_TOOL_NONE   */
     bool topology_deltas; /* accepts TOPOLOGY_DELTA; else adaptive parts keep the triangles of their asset; false is not
                              on the wire */
+    bool moves;           /* goes where a `move` sends it; false is not on the wire */
 } pal_wire_join;
 
 typedef struct pal_wire_arg {
@@ -352,6 +363,7 @@ typedef struct pal_control {
         pal_wire_members members;
         pal_wire_orders orders;
         pal_wire_error error; /* error             */
+        pal_wire_move move;
         pal_wire_join join;
         pal_wire_command command; /* command               */
         int tool;                 /* take: index or PAL_WIRE_TOOL_ANY; leave: unused */

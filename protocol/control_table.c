@@ -146,11 +146,14 @@ static const pal_control_field ORDERS_fields[] = {{"orders", OBJECTS, true, LIST
                                                   {0}};
 static const pal_control_field ERROR_fields[] = {
     {"code", TEXT, true, ONE(error, code)}, {"text", TEXT, true, ONE(error, text)}, {0}};
-static const pal_control_field JOIN_fields[] = {{"name", TEXT, true, ONE(join, name)},
-                                                {"role", ROLE, true, ONE(join, role)},
-                                                {"tool", TOOL, false, ONE(join, tool)},
-                                                {"topology_deltas", BOOL, false, ONE(join, topology_deltas)},
+static const pal_control_field MOVE_fields[] = {{"address", TEXT, true, ONE(move, address)},
+                                                {"session", TEXT, true, ONE(move, session)},
+                                                {"ticket", TEXT_OR_EMPTY, false, ONE(move, ticket)},
                                                 {0}};
+static const pal_control_field JOIN_fields[] = {
+    {"name", TEXT, true, ONE(join, name)},    {"role", ROLE, true, ONE(join, role)},
+    {"tool", TOOL, false, ONE(join, tool)},   {"topology_deltas", BOOL, false, ONE(join, topology_deltas)},
+    {"moves", BOOL, false, ONE(join, moves)}, {0}};
 static const pal_control_field COMMAND_fields[] = {{"verb", TEXT, true, ONE(command, verb)},
                                                    {"target", TEXT, false, ONE(command, target)},
                                                    {"args", ARGS, false, LIST(command, arg, n_arg), NULL},

@@ -11,7 +11,7 @@
 enum {
     PAL_TICKET_BYTES = 30,
     PAL_TICKET_KEY_BYTES = 32,
-    PAL_TICKET_TEXT = 84, /* characters of a ticket, and the zero */
+    PAL_TICKET_TEXT = PAL_WIRE_TICKET_BYTES, /* characters of a ticket, and the zero */
 };
 
 typedef struct pal_ticket {

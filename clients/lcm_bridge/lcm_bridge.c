@@ -52,7 +52,8 @@ struct pal_lcm_bridge {
     pal_link_loop *loop;
     pal_lcm_link *lcm;
     pal_link *watcher;
-    char server[256], session[PAL_WIRE_NAME_BYTES], organ[PAL_WIRE_TEXT_BYTES];
+    char server[PAL_WIRE_TEXT_BYTES + PAL_WIRE_NAME_BYTES + 16], session[PAL_WIRE_NAME_BYTES],
+        organ[PAL_WIRE_TEXT_BYTES];
     bool named;
     pal_wire_role role; /* of the watcher */
     pal_wire_topology topology;
@@ -247,6 +248,11 @@ static void watcher_control(void *user, const pal_control *c)
 {
     pal_lcm_bridge *b = user;
     pal_lcm_orders_control(&b->orders, c);
+    if (c->type == PAL_CONTROL_MOVE) {
+        /* links of tools that are open move by themselves; this is for those opened later */
+        snprintf(b->server, sizeof b->server, "%s?session=%s", c->move.address, c->move.session);
+        pal_asset_store_move(b->store, b->server);
+    }
     if (c->type == PAL_CONTROL_HELLO) {
         if (!b->named) memcpy(b->session, c->hello.session, sizeof b->session);
         memcpy(b->organ, c->hello.organ, sizeof b->organ);

@@ -25,8 +25,13 @@ pal_asset_store *pal_asset_store_create(pal_link_loop *loop, const char *url,
     pal_asset_store *store = calloc(1, sizeof *store);
     if (!store) return NULL;
     *store = (pal_asset_store){.loop = loop, .changed = changed, .user = user};
-    strncpy(store->url, url, sizeof store->url - 1);
+    pal_asset_store_move(store, url);
     return store;
+}
+
+void pal_asset_store_move(pal_asset_store *store, const char *address)
+{
+    strncpy(store->url, address, sizeof store->url - 1);
 }
 
 void pal_asset_store_destroy(pal_asset_store *store)

@@ -5,7 +5,8 @@
  * thread inside pal_link_run ([net]). Other threads may call only pal_link_stop.
  *
  * A link connects and joins. After a loss it reconnects by timer, with pauses that double from 0.25 s to 5 s, until it
- * is closed or the server refuses permanently (protocol/README.md, "Closing"). Sending never blocks: the newest pose
+ * is closed or the server refuses permanently (protocol/README.md, "Closing"). A server that ends may name another one
+ * (`move`): the link goes there, and tells its user like any other message. Sending never blocks: the newest pose
  * and the newest acknowledgement wait in one slot each, control messages in a queue of 16. One message is written each
  * time the socket is writable, control first. wss and https URLs use TLS: the server's certificate must be signed by an
  * authority of the system, or by that of the PEM file that the environment variable PALPATE_CA names; that of

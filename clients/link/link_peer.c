@@ -15,6 +15,8 @@ enum {
     LINK_UNSENT = 2048, /* bytes that may wait in the socket: a dozen poses */
     LINK_PAUSE_MAX_MS = 5000
 };
+/* ns after a `move` for which a server without the session is asked again: it may be loading the scene */
+#define LINK_MOVE_NS 60000000000u
 
 struct pal_link {
     pal_link *next;
@@ -25,6 +27,7 @@ struct pal_link {
     char protocols[128]; /* that it offers */
     pal_link_options o;  /* without url and name, which are copied */
     bool closing, up, fixed, pause_reading;
+    uint64_t moved_ns; /* when a `move` has come; 0: none since the last hello */
     double read_budget;
     uint64_t read_ns;
     pal_link_state state;
@@ -102,7 +105,8 @@ static void link_lost(pal_link *link, const char *reason)
         link_free(link);
         return;
     }
-    if (!link_may_return(link->close_code)) {
+    const bool moving = link->moved_ns && pal_clock_ns() - link->moved_ns < LINK_MOVE_NS;
+    if (!link_may_return(link->close_code) && !(moving && link->close_code == PAL_WIRE_CLOSE_NO_SESSION)) {
         link_report(link, PAL_LINK_ENDED, reason);
         return;
     }
@@ -125,6 +129,13 @@ static void link_connect(pal_link *link)
     lws_client_connect_via_info(&info);
 }
 
+/* its address has changed */
+static void link_offer(pal_link *link)
+{
+    snprintf(link->protocols, sizeof link->protocols, link->address.ticket[0] ? "%s, %s%s" : "%s", PAL_PROTOCOL_NAME,
+             PAL_TICKET_PREFIX, link->address.ticket);
+}
+
 pal_err pal_link_open(pal_link_loop *loop, const pal_link_options *options, pal_diagnostic *diag, pal_link **out)
 {
     pal_link *link = calloc(1, sizeof *link);
@@ -135,8 +146,7 @@ pal_err pal_link_open(pal_link_loop *loop, const pal_link_options *options, pal_
         return err;
     }
     link->loop = loop;
-    snprintf(link->protocols, sizeof link->protocols, link->address.ticket[0] ? "%s, %s%s" : "%s", PAL_PROTOCOL_NAME,
-             PAL_TICKET_PREFIX, link->address.ticket);
+    link_offer(link);
     strncpy(link->name, options->name ? options->name : "client", sizeof link->name - 1);
     link->o = *options;
     link->o.url = link->o.name = NULL;
@@ -284,6 +294,19 @@ static void link_fault(pal_link *link, int refusal)
     if (link->o.events->fault) link->o.events->fault(link->o.user, refusal);
 }
 
+/* the next connection goes to another server; an address that is none leaves everything as it is */
+static void link_move(pal_link *link, const pal_wire_move *move)
+{
+    char url[sizeof move->address + sizeof move->session + 16];
+    link_address to;
+    snprintf(url, sizeof url, "%s?session=%s", move->address, move->session);
+    if (link_address_parse(url, &to, NULL)) return;
+    memcpy(to.ticket, move->ticket[0] ? move->ticket : link->address.ticket, sizeof to.ticket);
+    link->address = to;
+    link->moved_ns = pal_clock_ns();
+    link_offer(link);
+}
+
 static void link_text(pal_link *link)
 {
     const int refusal = pal_control_get((const char *)link->in.at, link->in.n, true, &link->control);
@@ -299,8 +322,10 @@ static void link_text(pal_link *link)
         link->id = link->control.hello.you_id;
         link->held = link->control.hello.you_tool;
         link->pause_ms = LINK_PAUSE_FIRST_MS;
+        link->moved_ns = 0;
         link->count.joins++;
     }
+    if (link->control.type == PAL_CONTROL_MOVE) link_move(link, &link->control.move);
     if (link->o.events->text) link->o.events->text(link->o.user, &link->control, (const char *)link->in.at, link->in.n);
     if (link->o.events->control) link->o.events->control(link->o.user, &link->control);
     if (hello && !link->closing) link_report(link, PAL_LINK_JOINED, "");
@@ -369,6 +394,7 @@ static void link_established(pal_link *link, struct lws *wsi)
     join.join.role = link->o.role;
     join.join.tool = link->o.tool;
     join.join.topology_deltas = link->o.topology_deltas;
+    join.join.moves = true;
     pal_link_send_control(link, &join);
     link_report(link, PAL_LINK_OPEN, "");
     if (link->fixed) lws_rx_flow_control(wsi, 0);

@@ -78,10 +78,22 @@ static void state(void *user, pal_link_state now, int code, const char *reason)
     if (now == PAL_LINK_ENDED) end(u, code ? code : PAL_WIRE_CLOSE_GOING_AWAY, reason);
 }
 
+/* the link goes there by itself: this is for assets, and for the next link */
+static void follow(pal_relay_upstream *u, const pal_wire_move *to)
+{
+    char own[sizeof to->ticket] = "";
+    const char *mark = strchr(u->url, '#');
+    if (mark) snprintf(own, sizeof own, "%s", mark + 1);
+    const char *ticket = to->ticket[0] ? to->ticket : own;
+    snprintf(u->url, sizeof u->url, "%s?session=%s%s%s", to->address, to->session, ticket[0] ? "#" : "", ticket);
+    pal_log(PAL_LOG_INFO, "upstream", "%s goes on at %s", to->session, to->address);
+}
+
 static void text(void *user, const pal_control *decoded, const char *bytes, size_t n_byte)
 {
     pal_relay_upstream *u = user;
     u->heard_ns = pal_clock_ns();
+    if (decoded->type == PAL_CONTROL_MOVE) follow(u, &decoded->move);
     pal_relay_take_text(u->kept, decoded, bytes, n_byte);
 }
 

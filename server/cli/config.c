@@ -42,6 +42,10 @@ const pal_flag pal_config_keys[PAL_CONFIG_KEYS] = {
     {"lcm_channel", "PREFIX", PAL_FLAG_TEXT, NULL, 0, 0, "of the channels of that bus; one a rig (PALPATE1)"},
     {"log", levels, PAL_FLAG_WORD, NULL, 0, 0, "what is logged (info)"},
     {"record", "FILE", PAL_FLAG_TEXT, NULL, 0, 0, "write the input log there, for palpate replay (off)"},
+    {"drain_to", "ADDRESS", PAL_FLAG_TEXT, NULL, 0, 0,
+     "where members go when this server ends: that of the server that resumes its sessions, https://b.example/ (off)"},
+    {"agones", "PORT", PAL_FLAG_COUNT, NULL, 1, 65535,
+     "be an Agones game server: port of its sidecar on this machine (AGONES_SDK_HTTP_PORT, else off)"},
 };
 /* where a key is stored, in the order of the keys */
 static const size_t place[PAL_CONFIG_KEYS] = {
@@ -51,7 +55,7 @@ static const size_t place[PAL_CONFIG_KEYS] = {
     offsetof(pal_config, viewer),      offsetof(pal_config, error_m),     offsetof(pal_config, max_clients),
     offsetof(pal_config, max_viewers), offsetof(pal_config, threads),     offsetof(pal_config, lcm),
     offsetof(pal_config, lcm_key),     offsetof(pal_config, lcm_channel), offsetof(pal_config, log),
-    offsetof(pal_config, record),
+    offsetof(pal_config, record),      offsetof(pal_config, drain_to),    offsetof(pal_config, agones),
 };
 
 void pal_config_default(pal_config *config)

@@ -9,7 +9,7 @@
 #include "server/base/flags.h"
 #include "server/base/log.h"
 
-enum { PAL_CONFIG_TEXT = 256, PAL_CONFIG_KEYS = 19 };
+enum { PAL_CONFIG_TEXT = 256, PAL_CONFIG_KEYS = 21 };
 
 typedef struct pal_config {
     char listen[PAL_CONFIG_TEXT]; /* "127.0.0.1"                                                         */
@@ -30,6 +30,8 @@ typedef struct pal_config {
     char lcm_channel[PAL_CONFIG_TEXT]; /* prefix of the channels of that bus; "": PALPATE1 */
     char log[PAL_CONFIG_TEXT];         /* "error" | "warn" | "info" | "debug"; info                           */
     char record[PAL_CONFIG_TEXT];      /* write the input log there; "": do not                               */
+    int agones;                        /* port of the Agones sidecar; 0: that of the environment, or none */
+    char drain_to[PAL_CONFIG_TEXT];    /* "https://b.example/": where members go when the server ends; "": nowhere */
 } pal_config;
 
 /* a key, for manuals and checks: its name ("allow_remote"), value, range and help; out is unused */

@@ -5,6 +5,7 @@
  * Signals have handlers instead of a blocked mask and sigwait: OpenBLAS starts threads before main, and a signal that
  * one thread does not block is delivered to that thread. Without a handler it is then discarded where it is ignored
  * (SIGINT of a background process of a shell), else it kills the process. */
+#include "server/agones/agones.h"
 #include "server/base/clock.h"
 #include "server/base/log.h"
 #include "server/base/thread.h"
@@ -61,6 +62,7 @@ typedef struct serve_run {
     pal_server *server;
     lcm_child lcm[MAX_SESSIONS];
     char lcm_program[PATH_MAX];
+    pal_agones *agones; /* NULL: none */
     pthread_t net_thread;
     pal_err net_err;
     double seconds; /* serve for so long; 0: until a signal */
@@ -170,6 +172,7 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
                                   .open = run->config.open,
                                   .key_file = run->config.keys,
                                   .viewer_folder = viewer_folder(&run->config, folder, sizeof folder),
+                                  .drain_to = run->config.drain_to,
                                   .error_m = run->config.error_m,
                                   .max_clients = run->config.max_clients,
                                   .max_viewers = run->config.max_viewers,
@@ -369,6 +372,23 @@ static void end_lcm(serve_run *run)
         }
 }
 
+/* ---- Agones ---- */
+
+static void look(void *user, pal_agones_server *server)
+{
+    const serve_run *run = user;
+    const pal_hub_pulse pulse = pal_server_pulse(run->server);
+    *server = (pal_agones_server){.alive = pulse.alive, .n_session = pulse.n_session, .n_client = pulse.n_client};
+}
+
+static pal_err start_agones(serve_run *run, pal_diagnostic *diag)
+{
+    int port = run->config.agones;
+    if (!port) PAL_TRY(pal_agones_port(diag, &port));
+    if (!port) return PAL_ERR_OK;
+    return pal_agones_start(&(pal_agones_options){.port = port, .look = look, .user = run}, &run->agones);
+}
+
 /* ---- running ---- */
 
 static void *net_main(void *user)
@@ -392,6 +412,7 @@ static pal_err run_all(serve_run *run, const char *const *input, int n_input, pa
     PAL_TRY(open_inputs(run, input, n_input, diag));
     PAL_TRY(open_server(run, diag));
     PAL_TRY(find_lcm(run, diag));
+    PAL_TRY(start_agones(run, diag));
     if (pal_thread_start(&run->net_thread, net_main, run)) return PAL_ERR_INTERNAL;
     if (announce(run)) run->net_err = PAL_ERR_IO;
     uint64_t end_ns = run->seconds > 0 ? pal_clock_ns() + (uint64_t)(1e9 * run->seconds) : UINT64_MAX;
@@ -482,6 +503,7 @@ int command_serve(int argc, char **argv)
     const int record_error = run.server && !err ? pal_server_record_error(run.server) : 0;
     if (record_error)
         err = pal_diagnostic_set(&diag, PAL_ERR_IO, "a recording ended before its session: %s", strerror(record_error));
+    pal_agones_stop(run.agones);
     pal_server_close(run.server);
     for (int i = 0; i < run.n; i++) pal_session_close(run.session[i]);
     for (int i = 0; i < run.n; i++) pal_served_scene_close(&run.served[i]);

@@ -7,6 +7,7 @@
 #include "server/net/hub_peers.h"
 #include "server/net/hub_rights.h"
 #include "server/net/hub_sessions.h"
+#include "server/net/hub_watch.h"
 #include "server/net/transport/plain_text.h"
 #include "server/net/tuning.h"
 
@@ -32,8 +33,7 @@ static void reply_plain(pal_reply *reply, int status, const char *text)
 static void get_health(pal_hub *hub, const pal_request *request, pal_reply *reply)
 {
     (void)request;
-    bool alive = true;
-    for (int r = 0; r < hub->n_room; r++) alive = alive && pal_session_is_alive(hub->room[r]->session);
+    const bool alive = pal_hub_is_alive(hub);
     reply_plain(reply, alive ? 200 : 503, alive ? "ok\n" : "a simulation has stalled\n");
 }
 

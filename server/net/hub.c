@@ -21,6 +21,7 @@
 #include "server/session/resume.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -266,6 +267,7 @@ static void hub_wake(void *user)
 {
     pal_hub *hub = user;
     uint64_t now = pal_loop_now_ns(hub->loop), apart = (uint64_t)(0.9e9 / PAL_STREAM_RATE_HZ), due = 0;
+    if (hub->leaving) return;
     for (int r = 0; r < hub->n_room; r++) {
         pal_hub_room *room = hub->room[r];
         bool used[PAL_STREAM_TIER_COUNT];
@@ -319,10 +321,28 @@ static void judge_tier(pal_client *c, uint64_t now)
     }
 }
 
+static void beat(pal_hub *hub)
+{
+    int n_client = 0;
+    for (const pal_client *c = hub->client; c < hub->client + hub->max_clients; c++) n_client += c->peer && c->id;
+    atomic_store(&hub->pulse.n_session, hub->n_room);
+    atomic_store(&hub->pulse.n_client, n_client);
+    if (pal_hub_is_alive(hub)) atomic_store(&hub->pulse.alive_ns, pal_clock_ns());
+}
+
+pal_hub_pulse pal_hub_read_pulse(const pal_hub *hub)
+{
+    return (pal_hub_pulse){.alive = pal_clock_ns() - atomic_load(&hub->pulse.alive_ns) < PAL_PULSE_NS,
+                           .n_session = atomic_load(&hub->pulse.n_session),
+                           .n_client = atomic_load(&hub->pulse.n_client)};
+}
+
 static void hub_tick(void *user)
 {
     pal_hub *hub = user;
     uint64_t now = pal_loop_now_ns(hub->loop);
+    if (hub->leaving) return;
+    beat(hub);
     hub_wake(hub);
     pal_hub_hand_over_idle_tools(hub);
     for (int r = 0; r < hub->n_room; r++) {
@@ -362,6 +382,7 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
     hub->source = options->source;
     hub->open = options->open;
     hub->error_m = options->error_m;
+    hub->drain_to = options->drain_to ? options->drain_to : "";
     hub->verb = options->verb ? options->verb : pal_verb_table;
     hub->n_verb = options->verb ? options->n_verb : pal_verb_count;
     hub->started_s = (uint32_t)time(NULL);
@@ -422,9 +443,44 @@ void pal_hub_events(pal_hub *hub, pal_peer_events *out)
                              .user = hub};
 }
 
+/* ---- end ---- */
+
+static void send_move(pal_client *c)
+{
+    pal_wire_move *move = &pal_hub_message(c->hub, PAL_CONTROL_MOVE)->move;
+    snprintf(move->address, sizeof move->address, "%s", c->hub->drain_to);
+    snprintf(move->session, sizeof move->session, "%s", pal_session_scene(c->room->session)->name);
+    pal_admission_renew(c->hub->admission, &c->grant, (uint64_t)time(NULL), move->ticket);
+    pal_hub_send(c);
+}
+
+void pal_hub_drain(pal_hub *hub)
+{
+    int n_sent = 0;
+    if (hub->leaving) return;
+    hub->leaving = true;
+    for (int r = 0; r < hub->n_room; r++) {
+        pal_hub_jobs_complete(hub->room[r]);
+        pal_session_finish(hub->room[r]->session);
+    }
+    for (int r = 0; hub->drain_to[0] && r < hub->n_room; r++)
+        for (pal_client *c = NULL; (c = pal_hub_next_member(hub->room[r], c));)
+            if (c->moves) send_move(c), n_sent++;
+    if (hub->drain_to[0])
+        pal_log(PAL_LOG_INFO, "drain", "%d sessions end, %d clients are sent to %s", hub->n_room, n_sent,
+                hub->drain_to);
+}
+
+bool pal_hub_moves_sent(const pal_hub *hub)
+{
+    if (!hub->drain_to[0]) return true;
+    for (const pal_client *c = hub->client; c < hub->client + hub->max_clients; c++)
+        if (c->peer && c->n_queue > 0) return false;
+    return true;
+}
+
 void pal_hub_goodbye(pal_hub *hub)
 {
-    hub->leaving = true;
     for (int i = 0; i < hub->max_clients; i++)
         if (hub->client[i].peer) pal_hub_drop(&hub->client[i], PAL_WIRE_CLOSE_GOING_AWAY, "the server ends");
 }

@@ -20,6 +20,7 @@ typedef struct pal_server_options {
     /* of the hub */
     bool open;                    /* whoever comes is what it asks to be; else a client without a ticket is a viewer */
     const char *key_file;         /* of tickets (ticket_keys.h); NULL: none */
+    const char *drain_to;         /* where members go when the server ends (pal_hub_drain), borrowed; NULL: nowhere */
     double error_m;               /* bound of streamed positions per axis; 0: 1/3000 of the box, at most 0.05 mm */
     int max_clients, max_viewers; /* members, and who only watches; 0: 200, 1000 */
     struct pal_resume **resume;   /* of sessions that go on after a crash: their edits, taken [n_session]; NULL, or an
@@ -40,7 +41,18 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
                        int n_session, pal_diagnostic *diag, pal_hub **out);
 void pal_hub_destroy(pal_hub *hub);                      /* after its transports; NULL is fine. [load] */
 void pal_hub_events(pal_hub *hub, pal_peer_events *out); /* for pal_transport_ops.open */
-void pal_hub_goodbye(pal_hub *hub);                      /* drops every peer with code 1001 and accepts no new ones */
+/* Accepts nobody and runs no command from now on. Every session stops, and its recording is complete and on the disk
+ * before a member learns of it, or is sent to drain_to: whoever arrives there finds its last state. Takes as long as
+ * the job that a session has under way, a step and a write of each session */
+void pal_hub_drain(pal_hub *hub);
+bool pal_hub_moves_sent(const pal_hub *hub); /* nobody's `move` waits for its transport */
+void pal_hub_goodbye(pal_hub *hub);          /* drops every peer with code 1001 */
+/* what other threads may know of it, as of the last tick */
+typedef struct pal_hub_pulse {
+    bool alive; /* every simulation steps, and the loop has turned within PAL_PULSE_NS */
+    int n_session, n_client;
+} pal_hub_pulse;
+pal_hub_pulse pal_hub_read_pulse(const pal_hub *hub); /* [any] */
 /* a ticket for who has started the server (admission.h). [load] */
 void pal_hub_start_ticket(const pal_hub *hub, pal_wire_role role, char text[PAL_TICKET_TEXT]);
 int pal_hub_record_error(const pal_hub *hub); /* errno of a recording that has ended; 0: none */

@@ -82,6 +82,7 @@ typedef struct pal_client {
     uint32_t out_cycle, sent_cycle;
     uint32_t sent_frame[PAL_BODY_MAX];  /* number of the last frame sent, per part */
     bool topology_deltas;               /* accepts TOPOLOGY_DELTA */
+    bool moves;                         /* goes where a `move` sends it */
     uint32_t sent_change[PAL_BODY_MAX]; /* last triangle change sent, per part (pal_triangle_slots.change) */
     uint8_t view[PAL_BODY_MAX];         /* subscribed pal_field, per part */
     bool interior[PAL_BODY_MAX];        /* with the values inside */
@@ -215,6 +216,11 @@ struct pal_hub {
     const pal_verb *verb;              /* known commands [n_verb], borrowed */
     int n_verb;
     double error_m;
+    struct {
+        _Atomic uint64_t alive_ns; /* when all was alive */
+        _Atomic int n_session, n_client;
+    } pulse;              /* written at each tick, read by any thread */
+    const char *drain_to; /* "": nowhere */
     pal_site *site;
     pal_admission *admission;
     int n_room, n_numbered, n_client;

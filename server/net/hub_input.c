@@ -106,7 +106,7 @@ void pal_hub_received(void *user, pal_peer *peer, const uint8_t *bytes, size_t n
     pal_client *c = peer->client;
     pal_wire_head head;
     (void)user;
-    if (!c || peer->drop_code) return;
+    if (!c || peer->drop_code || c->hub->leaving) return;
     if (!pal_bucket_take(text ? &c->orders : &c->poses, pal_loop_now_ns(c->hub->loop))) {
         c->hub->count.n_flood++;
         pal_hub_drop(c, PAL_WIRE_CLOSE_RATE, "more than %d %s a second", text ? PAL_CONTROL_1_S : PAL_MESSAGES_1_S,

@@ -121,6 +121,7 @@ static void *run(void *user)
             make(&s->job);
             pthread_mutex_lock(&s->lock);
             s->state = DONE;
+            pthread_cond_signal(&s->changed);
             pal_loop_wake(s->loop);
         } else {
             pthread_cond_wait(&s->changed, &s->lock);
@@ -425,4 +426,16 @@ void pal_hub_jobs_update(pal_hub_room *room)
     if (!s) return;
     if (collect(s, &job)) finish(s, &job);
     begin_next(s);
+}
+
+void pal_hub_jobs_complete(pal_hub_room *room)
+{
+    pal_hub_jobs *s = room->jobs;
+    pal_job job;
+    if (!s) return;
+    pthread_mutex_lock(&s->lock);
+    while (s->state == SUBMITTED) pthread_cond_wait(&s->changed, &s->lock);
+    pthread_mutex_unlock(&s->lock);
+    if (collect(s, &job)) finish(s, &job);
+    pal_hub_jobs_end(room);
 }

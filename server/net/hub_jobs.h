@@ -85,5 +85,7 @@ void pal_hub_accept_load(pal_hub_room *room);
 bool pal_hub_jobs_busy(const pal_hub_room *room); /* a job is in progress or waits */
 bool pal_hub_jobs_own(const pal_hub_room *room);  /* so is one of the server itself */
 void pal_hub_jobs_update(pal_hub_room *room); /* commits and answers the finished job, and starts the next command */
-void pal_hub_jobs_end(pal_hub_room *room);    /* waits for the job in progress and frees it; the thread ends */
+/* waits for the job in progress, then commits and answers it; what waits is dropped, the thread ends */
+void pal_hub_jobs_complete(pal_hub_room *room);
+void pal_hub_jobs_end(pal_hub_room *room); /* waits for the job in progress and frees it; the thread ends */
 #endif

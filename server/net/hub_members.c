@@ -203,6 +203,7 @@ void pal_hub_join(pal_client *c, const pal_wire_join *wanted)
     if (!enter(c, role, wanted->name)) return;
     c->hub->count.n_joined++;
     c->topology_deltas = wanted->topology_deltas;
+    c->moves = wanted->moves;
     c->reported_order = room->n_order > PAL_WIRE_ORDER_MAX ? room->n_order - PAL_WIRE_ORDER_MAX : 0;
     /* nobody has looked: what the stream holds is the shape of then, and the next cycle has that of now */
     if (pal_session_observe(room->session, true)) c->sent_cycle = room->stream->cycle;

@@ -126,3 +126,10 @@ void pal_hub_watch_pace(pal_hub_room *room)
         room->undone_ns = now;
     if (pal_session_scene(room->session)->keep_real_time) keep_real_time(room, f, now);
 }
+
+bool pal_hub_is_alive(const pal_hub *hub)
+{
+    for (int r = 0; r < hub->n_room; r++)
+        if (!pal_session_is_alive(hub->room[r]->session)) return false;
+    return true;
+}

@@ -7,4 +7,5 @@
 #include "server/net/hub_core.h"
 
 void pal_hub_watch_pace(pal_hub_room *room); /* called at every tick */
+bool pal_hub_is_alive(const pal_hub *hub);   /* does every simulation step? */
 #endif

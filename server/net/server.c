@@ -85,11 +85,22 @@ static pal_err choose_health_address(pal_server *s, const char *health, pal_diag
     return PAL_ERR_OK;
 }
 
+/* a page's address, because browsers open it: "http[s]://host[:port][/]" */
+static pal_err check_drain_address(const char *to, pal_diagnostic *diag)
+{
+    const char *host = !strncmp(to, "http://", 7) ? to + 7 : !strncmp(to, "https://", 8) ? to + 8 : "";
+    const size_t n = strcspn(host, "/?# ");
+    if (n == 0 || (host[n] && strcmp(host + n, "/")))
+        return PAL_REFUSE(diag, "--drain-to %.120s: wanted the address of a server, as https://b.example:8090/", to);
+    return PAL_ERR_OK;
+}
+
 static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_session **session, int n_session,
                           pal_diagnostic *diag)
 {
     pal_peer_events events;
     PAL_TRY(choose_address(options, &s->address, diag));
+    if (options->drain_to && options->drain_to[0]) PAL_TRY(check_drain_address(options->drain_to, diag));
     if (options->health && options->health[0]) PAL_TRY(choose_health_address(s, options->health, diag));
     if (options->viewer_folder) PAL_TRY(pal_site_open(options->viewer_folder, diag, &s->site));
     /* besides members and viewers: sockets kept for the health listener, connections that do not join, page loads, and
@@ -121,9 +132,12 @@ pal_err pal_server_run(pal_server *server)
 {
     pal_err err = pal_loop_run(server->loop);
     if (err) return err;
+    pal_hub_drain(server->hub);
     /* clients get the reason; those that do not read it within PAL_GOODBYE_NS are cut off */
     uint64_t end = pal_loop_now_ns(server->loop) + PAL_GOODBYE_NS;
+    while (!pal_hub_moves_sent(server->hub) && pal_loop_now_ns(server->loop) < end) pal_loop_step(server->loop, end);
     pal_hub_goodbye(server->hub);
+    end += PAL_GOODBYE_NS;
     while (pal_hub_clients(server->hub) && pal_loop_now_ns(server->loop) < end) pal_loop_step(server->loop, end);
     return PAL_ERR_OK;
 }
@@ -146,6 +160,11 @@ int pal_server_record_error(const pal_server *server)
 bool pal_server_has_ended(const pal_server *server, int i)
 {
     return pal_hub_has_ended(server->hub, i);
+}
+
+pal_hub_pulse pal_server_pulse(const pal_server *server)
+{
+    return pal_hub_read_pulse(server->hub);
 }
 
 int pal_server_port(const pal_server *server)
@@ -179,4 +198,14 @@ pal_transport *pal_server_transport(pal_server *server)
 void pal_server_advance(pal_server *server)
 {
     pal_loop_advance(server->loop);
+}
+
+void pal_server_drain(pal_server *server)
+{
+    pal_hub_drain(server->hub);
+}
+
+void pal_server_goodbye(pal_server *server)
+{
+    pal_hub_goodbye(server->hub);
 }

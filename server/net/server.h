@@ -29,6 +29,7 @@ void pal_server_stop(pal_server *server);   /* [any], also from a signal-handlin
 void pal_server_start_ticket(const pal_server *server, pal_wire_role role, char text[PAL_TICKET_TEXT]);
 int pal_server_record_error(const pal_server *server);      /* errno of a recording that has ended; 0: none. [load] */
 bool pal_server_has_ended(const pal_server *server, int i); /* session i of open, by an instructor? [any] */
+pal_hub_pulse pal_server_pulse(const pal_server *server);   /* [any] */
 int pal_server_port(const pal_server *server);
 int pal_server_health_port(const pal_server *server); /* -1: no listener of its own */
 void pal_server_close(pal_server *server);            /* [load] */
@@ -37,4 +38,7 @@ void pal_server_close(pal_server *server);            /* [load] */
  * thread is [net]. */
 struct pal_transport *pal_server_transport(pal_server *server);
 void pal_server_advance(pal_server *server);
+/* what pal_server_run does at its end: completes recordings and tells members where to go; drops them (hub.h) */
+void pal_server_drain(pal_server *server);
+void pal_server_goodbye(pal_server *server);
 #endif

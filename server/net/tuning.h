@@ -9,6 +9,8 @@
 #define PAL_BRUSH_SOFTNESS 0.5
 /* ns: within this time a peer joins, and the world answers a command about a component (test_ws, test_plan_hub) */
 #define PAL_ANSWER_NS 5000000000u
+/* ns without a turn of the loop, several times a second, after which a server is not alive (test_gameserver) */
+#define PAL_PULSE_NS 2000000000u
 /* ns without an acknowledgement after which a client is closed (protocol/README.md, "Cycles and credit"; test_hub) */
 #define PAL_STALL_NS 10000000000u
 /* ns: a client that skips a quarter of the cycles in this time gets coarser frames, and finer ones after five such

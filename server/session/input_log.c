@@ -19,7 +19,7 @@
 #include <unistd.h>
 #include <zlib.h>
 
-enum { VERSION = 6, RING_DEFAULT = 4 << 20, MAX_NUMBER = 9999 };
+enum { VERSION = 6, MAX_NUMBER = 9999 };
 static const char magic[8] = {'p', 'a', 'l', 'i', 'n', 'l', 'o', 'g'};
 
 struct pal_input_log {
@@ -360,7 +360,7 @@ pal_err pal_input_log_open(const char *path, const pal_scene *scene, size_t ring
 {
     pal_input_log *log = calloc(1, sizeof *log);
     size_t n_ring = 1024;
-    while (n_ring < (ring_byte ? ring_byte : RING_DEFAULT)) n_ring *= 2;
+    while (n_ring < (ring_byte ? ring_byte : PAL_LOG_RING_BYTES)) n_ring *= 2;
     if (log) log->ring = calloc(1, n_ring);
     if (!log || !log->ring) {
         free(log);
@@ -443,12 +443,18 @@ int pal_input_log_error(const pal_input_log *log)
     return log ? atomic_load_explicit(&log->error, memory_order_relaxed) : 0;
 }
 
+void pal_input_log_flush(pal_input_log *log)
+{
+    if (atomic_exchange(&log->stop, true)) return;
+    pthread_join(log->thread, NULL);
+}
+
 pal_err pal_input_log_close(pal_input_log *log, uint64_t step, uint64_t hash)
 {
     uint8_t bytes[PAL_INPUT_HEAD + PAL_INPUT_PAYLOAD];
     if (!log) return PAL_ERR_OK;
-    atomic_store(&log->stop, true);
-    pthread_join(log->thread, NULL);
+    pal_input_log_flush(log);
+    drain(log);
     pal_input_record end = {.kind = PAL_INPUT_END, .step = step, .hash = hash, .n_dropped = log->n_dropped};
     if (!pal_input_log_error(log)) {
         log->unsaved = true;

@@ -96,7 +96,10 @@ uint64_t pal_input_log_dropped(const pal_input_log *log);                   /* [
 const char *pal_input_log_path(const pal_input_log *log);                   /* of the file */
 /* errno of the first write that failed, after which nothing is written; 0: none. NULL: 0. [any] */
 int pal_input_log_error(const pal_input_log *log);
-/* writes END with the last hash of the world, joins the writer and closes the file; IO: any write failed. [load] */
+/* everything put so far is in the file and on the disk, and the ring buffer is empty; the writer thread has ended, so
+ * that what is put from now on waits for the close. [load] */
+void pal_input_log_flush(pal_input_log *log);
+/* writes END with the last hash of the world, flushes and closes the file; IO: any write failed. [load] */
 pal_err pal_input_log_close(pal_input_log *log, uint64_t step, uint64_t hash);
 
 typedef struct pal_input_header {

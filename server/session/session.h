@@ -120,7 +120,11 @@ double pal_session_pause_s(const pal_session *session, int *n_rehearsed);
  * functions below take no change and no transfer for it. */
 pal_err pal_session_open_at(const pal_session *before, struct pal_resume *resume, bool plays, const char *record_path,
                             pal_diagnostic *diag, pal_session **out);
-void pal_session_close(pal_session *session); /* stops and joins the thread; NULL is fine. [load] */
+/* Stops and joins the thread and completes the record: the state of now, so that who goes on from it steps nothing
+ * again, then END; afterwards it is on the disk. Views of the session and its last frame stay; input is ignored.
+ * [load], or [net] while no job is under way */
+void pal_session_finish(pal_session *session);
+void pal_session_close(pal_session *session); /* finishes first; NULL is fine. [load] */
 
 /* What plays, where, and how true. At an edit or a switch the session waits: another one has to go on behind it,
  * because it has another scene */

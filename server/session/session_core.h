@@ -75,6 +75,7 @@ struct pal_session {
 
     /* the simulation thread's own */
     pal_input_log *log;
+    int record_error; /* errno of a record that is complete, or was to be; 0: none */
     /* the rest of a recording that is played, the next record, and the steps taken until now */
     const uint8_t *play;
     size_t n_play, play_at;

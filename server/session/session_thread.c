@@ -12,6 +12,7 @@
 #include "server/session/tuning.h"
 #include "server/solve/preflight.h"
 
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -280,6 +281,15 @@ static void record_state(pal_session *s, pal_input_kind kind)
     }
 }
 
+/* bytes of the log's ring buffer: room for two states, because one that does not fit would be dropped */
+static size_t ring_bytes(const pal_session *s)
+{
+    size_t n = 0;
+    for (int b = 0; b < pal_world_body_count(s->world); b++)
+        n += 2 * 6 * sizeof(double) * (size_t)pal_world_body(s->world, b)->n_dof;
+    return n > PAL_LOG_RING_BYTES ? n : PAL_LOG_RING_BYTES;
+}
+
 static void step(pal_session *s)
 {
     if (s->n_marks == 0) mark_pace(s, session_now_ns(s));
@@ -422,7 +432,7 @@ static pal_err prepare(pal_session *s, pal_diagnostic *diag)
                                &s->tool[t].slot[2]);
     if (!s->options.record_path) return PAL_ERR_OK;
     const pal_scene *recorded = s->options.resume ? pal_resume_recorded_scene(s->options.resume) : s->scene;
-    PAL_TRY(pal_input_log_open(s->options.record_path, recorded, 0, diag, &s->log));
+    PAL_TRY(pal_input_log_open(s->options.record_path, recorded, ring_bytes(s), diag, &s->log));
     if (s->options.resume) {
         pal_resume_record(s->options.resume, s->log);
         record_state(s, PAL_INPUT_RESTORE);
@@ -511,16 +521,25 @@ pal_err pal_session_open_at(const pal_session *before, pal_resume *resume, bool 
     return pal_session_open(pal_resume_scene(resume), &options, diag, out);
 }
 
+void pal_session_finish(pal_session *s)
+{
+    pal_session_stop(s);
+    if (!s->log) return;
+    pal_input_log_flush(s->log);
+    const bool is_new = s->state_work_ns > 0 || s->step >= s->state_step;
+    if (is_new && !atomic_load(&s->replaced)) record_state(s, PAL_INPUT_STATE); /* the next session has the state */
+    if (pal_input_log_dropped(s->log))
+        pal_log(PAL_LOG_WARN, "record", "%s: %llu records did not fit and are missing: the log cannot be replayed",
+                pal_input_log_path(s->log), (unsigned long long)pal_input_log_dropped(s->log));
+    s->record_error = pal_input_log_error(s->log);
+    if (pal_input_log_close(s->log, s->step, pal_world_hash(s->world)) && !s->record_error) s->record_error = EIO;
+    s->log = NULL;
+}
+
 void pal_session_close(pal_session *s)
 {
     if (!s) return;
-    pal_session_stop(s);
-    if (s->log) {
-        if (pal_input_log_dropped(s->log))
-            pal_log(PAL_LOG_WARN, "record", "%s: %llu records did not fit and are missing: the log cannot be replayed",
-                    pal_input_log_path(s->log), (unsigned long long)pal_input_log_dropped(s->log));
-        (void)pal_input_log_close(s->log, s->step, pal_world_hash(s->world)); /* it tells what fails */
-    }
+    pal_session_finish(s);
     release(s);
 }
 
@@ -533,7 +552,7 @@ const pal_scene *pal_session_scene(const pal_session *s)
 
 int pal_session_record_error(const pal_session *s)
 {
-    return pal_input_log_error(s->log);
+    return s->log ? pal_input_log_error(s->log) : s->record_error;
 }
 
 double pal_session_predicted_load(const pal_session *s)

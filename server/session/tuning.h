@@ -18,6 +18,8 @@
 #define PAL_HAND_SIZE_S  0.05
 #define PAL_HAND_SLACK_S 0.01
 #define PAL_LIFT_NS      100000000u
+/* bytes of the ring buffer of the input log, at least: the poses of eight tools for many s (test_replay) */
+#define PAL_LOG_RING_BYTES ((size_t)4 << 20)
 /* ns between two writes of the input log, and the longest wait of its closing (test_replay) */
 #define PAL_LOG_FLUSH_NS 20000000u
 /* between two states in the input log: s of simulated time, and ns of processor time for the steps. Who goes on after a

@@ -9,7 +9,7 @@ const tree = process.argv[2] ?? path.join(import.meta.dirname, "../..");
 // rooms from the lowest floor up; rooms of one line do not see each other
 const floors = [
     ["server/base", "protocol", "lcmtypes"],
-    ["server/num", "server/rendering", "clients/link"],
+    ["server/num", "server/rendering", "server/agones", "clients/link"],
     ["server/mesh/geometry", "clients/haptic_bridge", "clients/lcm_bridge", "clients/scripted_client"],
     ["server/mesh/files", "server/mesh/voxel"],
     ["server/mesh/scan", "server/mesh/cells"],
@@ -40,6 +40,7 @@ const narrow = {
     "server/net/transport": ["protocol", "server/base"],
     "server/net/admission": ["protocol", "server/base"],
     "server/rendering": ["protocol", "server/base"],
+    "server/agones": ["server/base"],
     "server/net": [
         "server/net/transport",
         "server/net/admission",

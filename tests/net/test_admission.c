@@ -102,6 +102,42 @@ static void a_ticket_for_one_admits_one_who_may_return(void)
     pal_admission_destroy(admission);
 }
 
+/* on another server with the same keys, where nobody remembers that the member was in */
+static void a_member_that_is_sent_elsewhere_is_let_in_there(void)
+{
+    pal_grant grant;
+    char renewed[PAL_TICKET_TEXT];
+    const pal_ticket ticket = {.role = PAL_WIRE_ROLE_TRAINEE,
+                               .tool = 1,
+                               .uses = 1,
+                               .session = pal_ticket_session("liver"),
+                               .user = 7,
+                               .expires_s = NOW_S + 60,
+                               .nonce = 99};
+    const char *text = sign(ticket);
+    begin(false);
+    CHECK_TEXT(refusal(text, NOW_S, 0, &grant), "");
+    pal_admission_renew(admission, &grant, NOW_S + 500, renewed);
+    pal_admission_destroy(admission);
+    begin(false);
+    CHECK_TEXT(refusal(text, NOW_S + 500, 0, &grant), "this ticket has expired");
+    CHECK_TEXT(refusal(renewed, NOW_S + 500 + 60, 0, &grant), "");
+    CHECK(grant.role == ticket.role && grant.tool == 1 && grant.ticket.uses == 1 && grant.ticket.user == 7 &&
+          grant.ticket.nonce == 99 && grant.ticket.session == ticket.session);
+    CHECK_TEXT(refusal(renewed, NOW_S + 500 + 61, 0, &grant), "this ticket has expired");
+    /* what holds longer, or for ever, is good as it is; who has none gets none */
+    CHECK_TEXT(refusal(sign((pal_ticket){.expires_s = NOW_S + 600}), NOW_S, 0, &grant), "");
+    pal_admission_renew(admission, &grant, NOW_S, renewed);
+    CHECK_TEXT(renewed, "");
+    CHECK_TEXT(refusal(sign((pal_ticket){.uses = 1}), NOW_S, 0, &grant), "");
+    pal_admission_renew(admission, &grant, NOW_S, renewed);
+    CHECK_TEXT(renewed, "");
+    CHECK_TEXT(refusal("", NOW_S, 0, &grant), "");
+    pal_admission_renew(admission, &grant, NOW_S, renewed);
+    CHECK_TEXT(renewed, "");
+    pal_admission_destroy(admission);
+}
+
 static void a_ban_is_of_a_personal_ticket_else_of_the_address(void)
 {
     pal_grant grant;
@@ -199,6 +235,7 @@ int main(void)
     RUN(without_a_ticket_one_watches);
     RUN(a_ticket_is_for_its_session_and_its_time);
     RUN(a_ticket_for_one_admits_one_who_may_return);
+    RUN(a_member_that_is_sent_elsewhere_is_let_in_there);
     RUN(a_ban_is_of_a_personal_ticket_else_of_the_address);
     RUN(keys_are_replaced_while_the_server_runs);
     RUN(wrong_key_files_name_the_line);

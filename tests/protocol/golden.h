@@ -272,8 +272,11 @@ static inline void golden_control(pal_control_type type, pal_control *c)
     case PAL_CONTROL_ERROR:
         c->error = (pal_wire_error){"tool_taken", "tool 0 is held by Ada"};
         break;
+    case PAL_CONTROL_MOVE:
+        c->move = (pal_wire_move){"https://b.example:8090/", "liver-2", "AQ-_"};
+        break;
     case PAL_CONTROL_JOIN:
-        c->join = (pal_wire_join){"Grace", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY, false};
+        c->join = (pal_wire_join){"Grace", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY, false, false};
         break;
     case PAL_CONTROL_COMMAND:
         c->command = (pal_wire_command){"material", "liver", 2, {{"young_Pa", 8000}, {"poisson", 0.45}}};

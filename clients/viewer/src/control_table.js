@@ -164,12 +164,13 @@ export const SERVER_MESSAGES = Object.freeze(
                 },
             ],
         },
+        move: { address: "text", session: "text", "ticket?": "text" },
     }),
 );
 
 export const CLIENT_MESSAGES = Object.freeze(
     /** @type {const} */ ({
-        join: { name: "text", role: "role", "tool?": "tool", "topology_deltas?": "bool" },
+        join: { name: "text", role: "role", "tool?": "tool", "topology_deltas?": "bool", "moves?": "bool" },
         command: { verb: "text", "target?": "text", "args?": "args" },
         take_tool: { tool: "tool" },
         release_tool: {},
@@ -210,6 +211,7 @@ export const ROLES = Object.freeze(/** @type {const} */ (["viewer", "trainee", "
  * @typedef {Message<typeof SERVER_MESSAGES.answer>} Answer
  * @typedef {Message<typeof SERVER_MESSAGES.study>} Study
  * @typedef {Message<typeof SERVER_MESSAGES.estimate>} Estimate
+ * @typedef {Message<typeof SERVER_MESSAGES.move>} Move
  * @typedef {Message<typeof part>} Part
  * @typedef {Message<typeof member>} Member
  * @typedef {NonNullable<Study["points"]>[number]} StudyPoint

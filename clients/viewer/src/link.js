@@ -25,6 +25,7 @@ const FIGURES_MS = 500;
 const LATENCY_MAX_MS = 10000; // a larger value comes from the clock of another connection
 const NONE = new Uint32Array(); // no vertex is doubled
 const SPARE_MAX = 4; // pairs of arrays that wait for reuse
+const MOVE_MS = 60000; // so long a server that a session moves to is asked for it: it may be loading the scene
 const CLOSE_FULL = 4003; // for now: tried again
 const CLOSE_NO_SESSION = 4004; // or it has ended
 const CLOSE_UNREADABLE = 4900; // close code: the server sent what this page cannot read
@@ -120,6 +121,8 @@ export class Link {
     figuresAt = 0;
     heardAt = 0; // ms
     silence = 0; // s, as the page was told
+    movedAt = -Infinity; // ms: of the last `move`, until the session answers
+    leaves = false; // the page goes to another host
     /** @type {Map<number, Part>} */
     parts = new Map();
     /** @type {Map<number, number>} epoch of the asset requested last */
@@ -165,6 +168,8 @@ export class Link {
     connect(options) {
         this.options = options;
         this.tries = 0;
+        this.movedAt = -Infinity;
+        this.leaves = false;
         this.close();
         this.dial();
     }
@@ -193,6 +198,7 @@ export class Link {
                 role: this.options.role,
                 tool: this.options.role === "viewer" ? null : -1,
                 topology_deltas: !this.options.toolOnly,
+                moves: true,
             });
         };
         socket.onmessage = (event) => {
@@ -208,8 +214,10 @@ export class Link {
             if (generation !== this.generation) return;
             this.generation++;
             this.socket = null;
+            if (this.leaves) return this.report("lost", textOf("link.moves"));
+            const moves = this.env.now() - this.movedAt < MOVE_MS;
             const text = FINAL.get(event.code);
-            if (text) {
+            if (text && !(moves && event.code === CLOSE_NO_SESSION)) {
                 // the reason of a session that is over says everything
                 const { code, reason } = event;
                 this.report("refused", (code === CLOSE_NO_SESSION ? reason : reason && `${text}: ${reason}`) || text);
@@ -221,7 +229,7 @@ export class Link {
                 "lost",
                 full
                     ? textOf("link.full", { reason: event.reason || textOf("link.session_full") })
-                    : textOf("link.lost"),
+                    : textOf(moves ? "link.moves" : "link.lost"),
             );
             const next = this.generation;
             this.env.later(() => next === this.generation && this.dial(), pause);
@@ -311,11 +319,25 @@ export class Link {
             this.ownTool = message.you.tool ?? -1;
             message.parts.forEach((part, i) => this.loadPart(i, part));
             this.report("live", "live");
+            this.movedAt = -Infinity;
             this.ping();
             this.listen();
         } else if (message.type === "topology") message.parts.forEach((part, i) => this.loadPart(i, part));
         else if (message.type === "pong") this.rtt = this.env.now() - message.stamp_ms;
+        else if (message.type === "move") this.move(message);
         this.env.post({ type: "control", message });
+    }
+
+    /**
+     * The next connection goes there. A page may only ask the host that it comes from: to another one, the page goes.
+     * @param {import("./control_table.js").Move} to
+     */
+    move(to) {
+        const url = new URL("ws", to.address.replace(/^http/, "ws"));
+        url.searchParams.set("session", to.session);
+        this.movedAt = this.env.now();
+        this.leaves = url.host !== new URL(this.options.url).host;
+        this.options = { ...this.options, url: url.href, ticket: to.ticket ?? this.options.ticket };
     }
 
     /** @param {number} seconds */

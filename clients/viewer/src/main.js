@@ -17,6 +17,7 @@ import { Layout } from "./layout.js";
 import { MembersPanel } from "./members_panel.js";
 import { Messages } from "./messages.js";
 import { OrientationCube } from "./orientation.js";
+import { movedAddress } from "./moved_address.js";
 import { OtherTools } from "./other_tools.js";
 import { pressDepth, withOwnTool } from "./own_tool.js";
 import { materialField, PaintColours } from "./paint_colours.js";
@@ -38,6 +39,7 @@ import { ViewModes } from "./view_modes.js";
 
 const FORCE_MIN_N = 0.005; // a smaller force is displayed as 0.00
 const SLOW_NOTICE_MS = 12000;
+const LEAVE_MS = 2000; // before a page goes to another host, which a browser asks once: the server there begins
 const MARK_RADIUS = 0.006; // of the scene's size: smallest drawn radius of a tool
 
 const worker = new Worker(new URL(`./socket_worker.js?lang=${language}`, import.meta.url), { type: "module" });
@@ -48,7 +50,7 @@ const send = (message) => post({ type: "control", message });
 /** @param {import("./sculpt_commands.js").Command & {target?: string}} command */
 const sendCommand = ({ verb, target = "", args }) => send({ type: "command", verb, target, args });
 
-const ticket = takeTicket(location, history, () => sessionStorage);
+let ticket = takeTicket(location, history, () => sessionStorage);
 const state = new AppState();
 const layout = new Layout();
 const stage = makeStage();
@@ -109,7 +111,7 @@ const showFigures = () => messages.showFigures();
 const tools = { accuracy, plots, sculpt, highlight, inside, viewMenu };
 const controls = new Controls({ state, stage, layout, input, fields, ...tools, send, showFigures });
 const panels = { panel, members, accuracy, plots, sculpt, highlight, playback, others, controls };
-const messages = new Messages({ state, stage, layout, bodies, fields, inside, input, marks, send, ...panels });
+const messages = new Messages({ state, stage, layout, bodies, fields, inside, input, marks, send, move, ...panels });
 worker.onmessage = (/** @type {MessageEvent<import("./link.js").PageMessage>} */ { data }) => messages.take(data);
 
 /** @returns {Stage} */
@@ -207,6 +209,18 @@ function joinOptions() {
     const role =
         ROLES.find((known) => known === query.get("role")) ?? (ticket ? roleOfTicket(ticket) : null) ?? "trainee";
     return { url, name: inputById("name").value.trim() || text("people.guest"), role, ticket };
+}
+
+/** the session goes on elsewhere @param {import("./control_table.js").Move} to */
+function move(to) {
+    const place = movedAddress(to, location.search, ticket);
+    if (place.host !== location.host) {
+        setTimeout(() => location.assign(place), LEAVE_MS);
+        return;
+    }
+    // the worker reconnects by itself: this is for what this page asks later
+    history.replaceState(null, "", place.search + place.hash);
+    ticket = takeTicket(location, history, () => sessionStorage);
 }
 
 const connect = () => post({ type: "connect", ...joinOptions() });

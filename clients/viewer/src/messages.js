@@ -21,6 +21,7 @@ import { sameTools } from "./tool_marks.js";
  *   sculpt: import("./sculpt_panel.js").SculptPanel, playback: import("./playback_bar.js").PlaybackBar,
  *   highlight: import("./sculpt_highlight.js").SculptHighlight,
  *   others: import("./other_tools.js").OtherTools, controls: import("./controls.js").Controls,
+ *   move: (to: import("./control_table.js").Move) => void,
  *   send: (message: import("./control_table.js").ClientMessage) => void
  * }} Page the parts of the page that messages act on
  */
@@ -113,6 +114,8 @@ export class Messages {
                 return accuracy.takeStudy(message);
             case "estimate":
                 return accuracy.takeEstimate(message);
+            case "move":
+                return this.page.move(message);
         }
     }
 

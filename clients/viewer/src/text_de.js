@@ -220,6 +220,7 @@ export const GERMAN = {
     "link.flood": "diese Seite hat zu viele Nachrichten gesendet",
     "link.full": "{reason}, neuer Versuch",
     "link.lost": "Verbindung verloren, verbindet wieder",
+    "link.moves": "die Sitzung zieht auf einen anderen Server um",
     "link.no_session": "diese Sitzung gibt es nicht",
     "link.rejected": "der Server hat eine Nachricht dieser Seite abgelehnt",
     "link.removed": "Sie können nicht mehr teilnehmen",

@@ -219,6 +219,7 @@ export const ENGLISH = {
     "link.flood": "this page sent too many messages",
     "link.full": "{reason}, trying again",
     "link.lost": "connection lost, reconnecting",
+    "link.moves": "the session moves to another server",
     "link.no_session": "there is no such session",
     "link.rejected": "the server rejected a message of this page",
     "link.removed": "you cannot take part any more",

@@ -4,6 +4,7 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { readFieldHead } from "../src/field_decoder.js";
+import { movedAddress } from "../src/moved_address.js";
 import { Link } from "../src/link.js";
 import { vertexNormals } from "../src/normals.js";
 import { hello, part as partInfo } from "./fixtures/messages.js";
@@ -98,7 +99,7 @@ test("joins with the protocol's name, asks for any tool and for patches", () => 
     assert.equal(s.sockets[0].sent.length, 0);
     s.sockets[0].accept();
     assert.deepEqual(s.sockets[0].texts(), [
-        { type: "join", name: "Ada", role: "trainee", tool: -1, topology_deltas: true },
+        { type: "join", name: "Ada", role: "trainee", tool: -1, topology_deltas: true, moves: true },
     ]);
 });
 
@@ -358,6 +359,55 @@ test("a message that cannot be read closes the connection, an old connection is 
     const n = s.posted.length;
     s.sockets[0].receive(hello());
     assert.equal(s.posted.length, n);
+});
+
+test("goes to the server that a move names, and waits there for the session", async () => {
+    const { s } = await joined();
+    const move = { type: "move", address: "http://host:1/", session: "liver", ticket: "new" };
+    s.link.options.ticket = "old";
+    s.sockets[0].receive(move);
+    assert.equal(s.sockets.length, 1); // not before the server has closed
+    const closes = [1001, 1006, 4004]; // the old server ends, the new one is not there, has not the session yet
+    for (const [k, code] of closes.entries()) {
+        /** @type {any} */ (s.sockets[k]).onclose({ code, reason: "" });
+        s.waiting.pop()?.call();
+        assert.equal(s.sockets[k + 1].url, "ws://host:1/ws?session=liver");
+        assert.deepEqual(s.sockets[k + 1].protocol, ["palpate.v2", "ticket.new"]);
+    }
+    s.sockets[3].accept();
+    s.sockets[3].receive(hello());
+    assert.equal(s.of("state").at(-1).state, "live");
+    // it has arrived: a session that ends there has ended
+    /** @type {any} */ (s.sockets[3]).onclose({ code: 4004, reason: "" });
+    assert.equal(s.of("state").at(-1).state, "refused");
+});
+
+test("a session that never comes is given up after a minute", async () => {
+    const { s } = await joined();
+    s.sockets[0].receive({ type: "move", address: "http://host:1", session: "liver" });
+    /** @type {any} */ (s.sockets[0]).onclose({ code: 1001, reason: "" });
+    s.waiting.pop()?.call();
+    s.time += 60001;
+    /** @type {any} */ (s.sockets[1]).onclose({ code: 4004, reason: "" });
+    assert.equal(s.of("state").at(-1).state, "refused");
+});
+
+test("a page leaves for another host, whose sockets it may not open", async () => {
+    const { s } = await joined();
+    s.waiting.length = 0;
+    s.sockets[0].receive({ type: "move", address: "https://b.example/", session: "liver" });
+    /** @type {any} */ (s.sockets[0]).onclose({ code: 1001, reason: "" });
+    assert.equal(s.waiting.length, 0);
+    assert.match(s.of("state").at(-1).text, /moves to another server/);
+    const to = { address: "https://b.example/", session: "liver-2", ticket: "new" };
+    assert.equal(
+        movedAddress(to, "?lang=de&session=liver", "old").href,
+        "https://b.example/?lang=de&session=liver-2#new",
+    );
+    assert.equal(
+        movedAddress({ address: "http://b:8090", session: "liver" }, "", "old").href,
+        "http://b:8090/?session=liver#old",
+    );
 });
 
 test("normals of a tetrahedron point away from its middle", () => {

@@ -170,6 +170,16 @@ void pal_admission_leave(pal_admission *a, const pal_grant *grant, uint64_t now_
     used->left_ns = now_ns;
 }
 
+void pal_admission_renew(const pal_admission *a, const pal_grant *grant, uint64_t unix_s, char text[PAL_TICKET_TEXT])
+{
+    const uint64_t until_s = unix_s + PAL_RETURN_NS / 1000000000u;
+    pal_ticket ticket = grant->ticket;
+    text[0] = 0;
+    if (!grant->has_ticket || !ticket.expires_s || !a->keys.n || ticket.expires_s >= until_s) return;
+    ticket.expires_s = until_s < UINT32_MAX ? (uint32_t)until_s : UINT32_MAX;
+    if (!pal_ticket_put(&ticket, &a->keys.key[a->keys.n - 1], text)) text[0] = 0;
+}
+
 void pal_admission_ban(pal_admission *a, const pal_grant *grant)
 {
     used_ticket *used = grant->has_ticket ? find_used(a, &grant->ticket) : NULL;

@@ -34,6 +34,10 @@ const char *pal_admission_check(pal_admission *admission, const char *text, cons
  */
 pal_err pal_admission_enter(pal_admission *admission, const pal_grant *grant, uint64_t now_ns);
 void pal_admission_leave(pal_admission *admission, const pal_grant *grant, uint64_t now_ns);
+/* A ticket with the same rights as that of a member whom this server sends elsewhere: it admits for PAL_RETURN_NS more,
+ * as if the member had lost its connection here. "": none is needed, as without an expiry, or none can be signed */
+void pal_admission_renew(const pal_admission *admission, const pal_grant *grant, uint64_t unix_s,
+                         char text[PAL_TICKET_TEXT]);
 /* bans the ticket if it was made for certain members, else the address from which the member came */
 void pal_admission_ban(pal_admission *admission, const pal_grant *grant);
 #endif
