@@ -422,8 +422,11 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
             core->reference = fmax(core->reference, tau * negligible_N(body) * sqrt(body->n_dof));
         }
         /* while inverted elements move the state is far from any that is asked for, and conjugate gradients lower the
-         * energy of the stage in every iteration */
-        const double tolerance = core->turns_back ? sqrt(core->options.tolerance) : core->options.tolerance;
+         * energy of the stage in every iteration. The preconditioner knows nothing of recovery: with 0.1 a drag of
+         * 14,119 nodes takes 5 iterations, with 0.3 two or three. A body that nothing touches has to come to rest, for
+         * which 0.2 is too much */
+        const double exponent = !core->turns_back ? 1 : core->system.has_contact ? 0.25 : 0.5;
+        const double tolerance = pow(core->options.tolerance, exponent);
         double best = tolerance * core->reference;
         to->residual = core->reference > 0 ? left / core->reference : 0;
         to->converged = k > 0 && left <= best;
