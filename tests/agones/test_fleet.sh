@@ -33,9 +33,10 @@ node "$here/fake_kubernetes.mjs" "$work/servers" >"$work/api" &
 api=$!
 pids="$pids $api"
 shows "$work/api" $api '^port '
-allocate() { # allocate NAME PORT: what is free, else nothing; what it prints is in $work/got
+session=one
+allocate() { # allocate NAME PORT: what is free, else nothing; opens $session; what it prints is in $work/got
     echo "${*:-}" >"$work/servers"
-    node "$here/../../deploy/agones/allocate.mjs" ball.json --session one --api "http://127.0.0.1:$(sed -n 's/^port //p' "$work/api")" \
+    node "$here/../../deploy/agones/allocate.mjs" ball.json --session $session --api "http://127.0.0.1:$(sed -n 's/^port //p' "$work/api")" \
         --namespace games --keys "$work/keys" --palpate "$bin/palpate" --site "https://127.0.0.1:$https" --admin "$work/admin" --map "$work/map" \
         >"$work/got" 2>"$work/got.err"
 }
@@ -58,6 +59,23 @@ pids="$pids $clients"
 url="$address#$ticket"
 members 4
 check "four members are inside" $? == 0
+
+# another session is opened, used and ended meanwhile
+session=two
+allocate gs-2 "$port2"
+two=$(sed 's/.*"address":"\([^"]*\)".*/\1/' "$work/got")
+timeout 100 "$bin/palpate-client" "$two#$(json ticket "$work/got")" --json --script press --seconds 60 --until cycles=20 >"$work/second" \
+    2>"$work/second.err"
+check "another is used meanwhile, through the same gateway" $? == 0
+timeout 100 "$bin/palpate-client" "$two#$ticket" --script press --seconds 60 --until cycles=1 --quiet 2>"$work/stranger.err"
+check "not with the ticket of the first" $? == 1
+node -e '
+    const [port, ticket] = process.argv.slice(1);
+    const headers = { Authorization: `Bearer ${ticket}`, "Content-Type": "application/json" };
+    fetch(`http://127.0.0.1:${port}/sessions`, { method: "POST", headers, body: `{"end":"two"}` }).then((answer) => console.log(answer.status))
+    ' "$port2" "$("$bin/palpate" ticket --keys "$work/keys" --role instructor --quiet)" >"$work/ended"
+check "and is ended" "$(cat "$work/ended")" == 200
+session=one
 kill -KILL "$pid1"
 wait "$job1" 2>/dev/null
 allocate gs-2 "$port2"
