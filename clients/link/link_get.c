@@ -1,6 +1,7 @@
 /* GET of one path over HTTP/1.1, for assets. */
 #include "clients/link/link_core.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -91,9 +92,13 @@ pal_err pal_link_get(pal_link_loop *loop, const char *url, const char *path, siz
     if (!get) return PAL_ERR_MEMORY;
     *get = (link_get){.next = loop->gets, .loop = loop, .done = done, .user = user, .max = max};
     loop->gets = get;
+    /* the session's name, by which a proxy finds its server, as for the socket */
+    char with_session[sizeof address.path + 256];
+    const char *query = strchr(address.path, '?');
+    snprintf(with_session, sizeof with_session, "%.255s%s", path, query ? query : "");
     struct lws_client_connect_info info = link_connect_info(loop, &address, LINK_LOCAL_GET, get, &get->wsi);
     info.origin = address.host;
-    info.path = path;
+    info.path = with_session;
     info.method = "GET";
     info.alpn = "http/1.1";
     /* on failure the callback has reported it */

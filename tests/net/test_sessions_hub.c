@@ -236,6 +236,9 @@ static void bad_requests_are_answered(void)
                                       "{\"open\":{\"open\":\"clay.json\"}}"};
     begin(true);
     for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) CHECK_INT(ask("", bad[k]), 422);
+    CHECK_INT(ask("", "{\"open\":\"clay.json\",\"name\":\"a b\"}"), 422);
+    CHECK_INT(ask("", "{\"open\":\"clay.json\",\"name\":\"../x\"}"), 422);
+    CHECK_INT(ask("", "{\"open\":\"clay.json\",\"name\":\"clay\"}"), 409);
     CHECK_INT(ask("", "{\"open\":\"../clay.json\"}"), 404);
     CHECK_INT(ask("", "{\"open\":\"clay\"}"), 404);
     char text[200] = "{\"open\":\"";

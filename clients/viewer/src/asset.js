@@ -152,3 +152,13 @@ export function decodeAsset(bytes) {
     check(asset, n);
     return asset;
 }
+
+/**
+ * Where an asset is fetched: with the session's name, by which a proxy finds its server, as for the socket.
+ * @param {string} path @param {string} socket address of it
+ */
+export function assetAddress(path, socket) {
+    const address = new URL(path, socket.replace(/^ws/, "http"));
+    address.search = new URL(socket).search;
+    return address.href;
+}

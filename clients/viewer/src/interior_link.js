@@ -1,6 +1,6 @@
 // The interiors of the parts, in the worker: the asset of an interior is fetched when its first message comes, so that
 // nobody loads what nobody looks at. The newest message waits for it.
-import { decodeAsset } from "./asset.js";
+import { assetAddress, decodeAsset } from "./asset.js";
 import { decodeInterior, readInteriorHead, tetrahedraOf } from "./interior_decoder.js";
 
 /**
@@ -28,7 +28,7 @@ export class InteriorLink {
 
     /** @param {number} part @param {{epoch: number, interior?: string}} info @param {string} base address of the server */
     offer(part, { epoch, interior }, base) {
-        if (interior) this.offered.set(part, { epoch, address: new URL(interior, base).href });
+        if (interior) this.offered.set(part, { epoch, address: assetAddress(interior, base) });
         else this.offered.delete(part);
     }
 

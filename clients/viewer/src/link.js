@@ -1,6 +1,6 @@
 // The connection of one viewer: join, assets, frames, credit, reconnection. Socket, fetch, clock and output are passed
 // in, so that the same code runs in the worker and under node --test.
-import { decodeAsset } from "./asset.js";
+import { assetAddress, decodeAsset } from "./asset.js";
 import { CommandQueue } from "./command_queue.js";
 import { readControl } from "./control_reader.js";
 import { fillCopies, originalsOf, splitCreases } from "./creases.js";
@@ -363,11 +363,11 @@ export class Link {
     /** @param {number} index @param {{epoch: number, asset: string, interior?: string, sculptable?: boolean}} info */
     async loadPart(index, info) {
         if (this.options.toolOnly) return;
-        this.interiors.offer(index, info, this.options.url.replace(/^ws/, "http"));
+        this.interiors.offer(index, info, this.options.url);
         if (this.requested.get(index) === info.epoch) return;
         this.requested.set(index, info.epoch);
         const generation = this.generation;
-        const address = new URL(info.asset, this.options.url.replace(/^ws/, "http")).href;
+        const address = assetAddress(info.asset, this.options.url);
         try {
             const asset = await decodeAsset(new Uint8Array(await this.env.get(address)));
             // responses may arrive out of order: only the newest epoch counts

@@ -1,5 +1,6 @@
 // Draws what a click of the chosen sculpting tool would change: faces and cells filled and outlined, edges, vertices,
 // the ring of a brush. The addon for wide lines and the control cells are loaded when sculpting is first chosen.
+import { assetAddress } from "./asset.js";
 import { circle } from "./brush_ring.js";
 import { ControlCells } from "./control_cells.js";
 import { atRest, nearestTriangle } from "./picking.js";
@@ -68,7 +69,7 @@ export class SculptHighlight {
             const entry = { epoch, file: null, cells: null };
             this.files.set(part, entry);
             // a file that has been replaced meanwhile is gone, and `topology` names the next
-            const reply = await fetch(control_cells).catch(() => null);
+            const reply = await fetch(assetAddress(control_cells, location.href)).catch(() => null);
             if (reply?.ok) entry.file = await reply.json().catch(() => null);
         });
         await Promise.all(loads);

@@ -1,5 +1,6 @@
 // The images of a body on its surface, in place of the colour of its tissue. They are drawn when all have come; until then
 // the body looks as it does without, and so does for good what an image that cannot be read would have covered.
+import { assetAddress } from "./asset.js";
 import * as THREE from "./three.js";
 
 /** a texture of one colour @param {string} colour */
@@ -22,7 +23,9 @@ export async function showImages(body, uv, addresses, colour, stage) {
     body.geometry.setAttribute("uv", new THREE.BufferAttribute(uv, 2));
     const loader = new THREE.TextureLoader();
     const textures = await Promise.all(
-        addresses.map((address) => loader.loadAsync(address).catch(() => plainTexture(colour))),
+        addresses.map((address) =>
+            loader.loadAsync(assetAddress(address, location.href)).catch(() => plainTexture(colour)),
+        ),
     );
     for (const texture of textures) {
         texture.colorSpace = THREE.SRGBColorSpace;

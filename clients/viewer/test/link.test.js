@@ -377,6 +377,7 @@ test("goes to the server that a move names, and waits there for the session", as
     s.sockets[3].accept();
     s.sockets[3].receive(hello());
     assert.equal(s.of("state").at(-1).state, "live");
+    assert.match(s.asked.at(-1), /^http:\/\/host:1\/asset\/\w+\?session=liver$/);
     // it has arrived: a session that ends there has ended
     /** @type {any} */ (s.sockets[3]).onclose({ code: 4004, reason: "" });
     assert.equal(s.of("state").at(-1).state, "refused");
