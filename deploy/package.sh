@@ -1,0 +1,20 @@
+#!/bin/sh
+# Builds the Debian packages palpate, palpate-dev and, where there is an MPI, palpate-mpi for every processor of this architecture, and
+# prints their paths.
+# usage: deploy/package.sh [cmake options]     -D CMAKE_C_FLAGS=-march=x86-64-v3 for processors since 2015 alone
+# PALPATE_BUILD names another build folder. Install with: apt-get install ./palpate_*.deb
+set -u
+case ${1-} in -h | --help)
+    sed -n '2,5s/^# \{0,1\}//p' "$0"
+    exit 0
+    ;;
+esac
+. "$(dirname "$0")/common.sh"
+install_missing run pack || exit 1
+install_missing mpi || message "without palpate-mpi: no MPI"
+fetch_viewer || fail "could not download the packages of the viewer, see $build/npm.log"
+message "building (the first time takes minutes)"
+build_release package -D PAL_BUILD_TESTS=OFF -D PAL_NATIVE=OFF "$@"
+rm -f "$build"/package/palpate*.deb
+(cd "$build/package" && cpack -G DEB) >"$build/cpack.log" 2>&1 || fail "could not pack, see $build/cpack.log"
+ls "$build"/package/palpate*.deb
