@@ -43,7 +43,7 @@ end
 begin "holds programs, page, examples and documentation, readable for all"
 dpkg-deb -c "$main" >list
 sed 's/^[^ ]* *[^ ]* *[^ ]* *[^ ]* *[^ ]* \.//' list >names
-for path in /usr/bin/palpate /usr/bin/palpate-client /usr/bin/palpate-bridge /usr/bin/palpate-lcm /usr/lib/systemd/system/palpate.service \
+for path in /usr/bin/palpate /usr/bin/palpate-client /usr/bin/palpate-bridge /usr/bin/palpate-lcm /usr/bin/palpate-relay /usr/lib/systemd/system/palpate.service \
     /usr/share/doc/palpate/README.md /usr/share/doc/palpate/copyright /usr/share/doc/palpate/CHANGELOG.md \
     /usr/share/doc/palpate/examples/haproxy.cfg /usr/share/doc/palpate/examples/batch/shard.sh /usr/share/doc/palpate/examples/demos/chair.orders \
     $(dpkg-deb --info "$main" conffiles); do
