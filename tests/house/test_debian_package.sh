@@ -108,8 +108,8 @@ if command -v systemd-analyze >/dev/null; then
     begin "its unit is sound"
     sed "s,/usr/bin/palpate,$dir/root&," root/usr/lib/systemd/system/palpate.service >palpate.service
     systemd-analyze verify ./palpate.service >out 2>err
-    grep palpate err >told
-    check "systemd-analyze says $(cat told)" is_empty told
+    grep palpate err >stated
+    check "systemd-analyze says $(cat stated)" is_empty stated
     end
 else
     skip "its unit is sound" "no systemd-analyze"

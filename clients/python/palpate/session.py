@@ -45,7 +45,8 @@ _ANSWERED = frozenset(
     "seek branch study_point configure delete divide extrude merge bridge sharpen paint set_rest_shape cut uncut "
     "undo redo probe".split()
 )
-_NOT_OF_AN_ORDER = frozenset(("tool_idle",))
+# errors that tell what has happened (protocol/README.md, "Errors")
+_NOT_OF_AN_ORDER = frozenset(("tool_idle", "tool_handed_over", "undone", "quality"))
 
 T = TypeVar("T")
 
