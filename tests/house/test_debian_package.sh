@@ -74,6 +74,13 @@ package() { # package OPTION...: dpkg in the folder, without the packages that t
 called() { grep -q "^$1" calls; }
 left() { (cd root && find . -path ./var/lib/dpkg -prune -o ! -type d -print) | sed 's,^\./,,' | sort | xargs; }
 
+begin "refuses a processor of other instructions"
+dpkg-deb --info "$main" preinst | sed 's/^level=.*/level=x86-64-v9/' >preinst
+sh preinst install >out 2>err
+code=$?
+refused 1 x86-64-v9
+end
+
 begin "installs, with a user and a service"
 package -i "$main"
 check "dpkg ends with $code" code_is 0
