@@ -1,1 +1,0 @@
-export * from "three/addons/lines/LineSegments2.js";

@@ -1,1 +1,0 @@
-export * from "three/addons/postprocessing/MaskPass.js";

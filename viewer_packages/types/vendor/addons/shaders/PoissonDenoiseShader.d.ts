@@ -1,1 +1,0 @@
-export * from "three/addons/shaders/PoissonDenoiseShader.js";
