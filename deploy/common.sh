@@ -53,11 +53,13 @@ install_missing() { # WHO...: on failure one line with the reason, and 1
     fi
 }
 
-build_release() { # [cmake options]: prints the log only when it fails
+build_release() { # FOLDER [cmake options]: a folder of the build folder; prints the log only when it fails
+    folder=$build/$1
+    shift
     mkdir -p "$build"
     log=$build/build.log
-    if ! cmake -S "$tree" -B "$build/release" -G Ninja -D PAL_PRESET=release -D PAL_VIEWER_PACKAGES="$build/viewer_packages" "$@" >"$log" 2>&1 ||
-        ! cmake --build "$build/release" >>"$log" 2>&1; then
+    if ! cmake -S "$tree" -B "$folder" -G Ninja -D PAL_PRESET=release -D PAL_VIEWER_PACKAGES="$build/viewer_packages" "$@" >"$log" 2>&1 ||
+        ! cmake --build "$folder" >>"$log" 2>&1; then
         tail -n 30 "$log" >&2
         fail "the build failed, see $log"
     fi

@@ -36,7 +36,7 @@ esac
 install_missing run || exit 1
 fetch_viewer || fail "could not download the packages of the viewer, see $build/npm.log"
 message "building (the first time takes a minute)"
-build_release -D PAL_BUILD_TESTS="$tests"
+build_release release -D PAL_BUILD_TESTS="$tests"
 palpate=$build/release/bin/palpate
 
 # a labelled abdominal CT from a Debian package (CC0-1.0)

@@ -16,7 +16,7 @@ case ${1-} in
 *) fail "unknown option ${1-} (known: --fast)" ;;
 esac
 
-install_missing run test || exit 1
+install_missing run test pack || exit 1
 install_missing scan || message "tests of the scan are skipped: it is not available"
 install_missing mpi || message "calibration over MPI is not built and its test is skipped"
 fetch_viewer || fail "could not download the packages of the viewer, see $build/npm.log"
@@ -106,7 +106,7 @@ count() { # PRESET: its tests, once both have run
     message "$preset: $n_pass passed, $n_fail failed, $n_skip skipped"
 }
 message "building release"
-build_release -D PAL_BUILD_TESTS=ON
+build_release release -D PAL_BUILD_TESTS=ON
 message "tests of release"
 compute release -LE waits
 if [ -z "$fast" ]; then

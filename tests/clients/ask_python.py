@@ -656,6 +656,7 @@ class Sculpt:
         need(state == "running", f"{state}")
         with palpate.join(f"{self.url}?session={name}#{self.ticket}", timeout=WAIT_S) as s:
             need(s.hello["session"] == name, "the wanted session")
+            s.asset(timeout=WAIT_S)  # nothing is fetched any more from a session that ends
             palpate.end_session(self.url, name, ticket=self.ticket, timeout=WAIT_S)
             error = refused(lambda: s._wait(lambda: None, WAIT_S, "not ended"), palpate.Disconnected)
             need(error and error.code == 4004, f"{error!r}")

@@ -3,12 +3,9 @@ method may be called from any thread and waits at most its timeout. Frames and f
 asks for them, so that a script that reads forces alone decodes none."""
 
 import asyncio
-import dataclasses
-import http.client
 import json
 import threading
 import time
-import urllib.error
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
@@ -21,22 +18,18 @@ from numpy.typing import ArrayLike, NDArray
 from websockets.typing import Subprotocol
 
 from . import wire
-from .asset import Asset, decode_asset
+from .asset import Asset
 from .control import Message, objects, read_control, text_of, whole
-from .errors import Disconnected, OrderRefused, PalpateError, TookTooLong, WireError, need
+from .errors import Disconnected, OrderRefused, PalpateError, TookTooLong, WireError
 from .field import Field, decode_field
-from .frame import Frame, FrameDecoder, epoch_of
-from .interior import Interior, decode_interior, tetrahedra_of
+from .frame import Frame, FrameDecoder
+from .interior import Interior, decode_interior
+from .parts import MESSAGE_MAX, Parts
 from .planes import U32
-from .topology_delta import decode_topology_delta
-from .web import address_of, get
+from .web import address_of
 from .wire import Haptic, Pose, Tool, Tools, given, read_haptic, read_tools, write_ack, write_pose
 
 _REPEAT_S = 0.05  # period of the repeated pose of a resting tool: the server releases one that is silent for 0.25 s
-_MESSAGE_MAX = 96 << 20  # bytes, as protocol/README.md, "Limits"
-_ASSET_MAX = 257 << 20  # bytes
-_ASSET_S = 60.0  # in which the server must go on sending an asset
-_NOTICE_S = 2.0  # in which the websocket of a server that has fallen ends as its files do
 _PAUSE_FIRST_S, _PAUSE_MAX_S = 0.25, 5.0  # before joining again; each is twice the one before
 # closures after which a client joins again (protocol/README.md, "Closing"); 0, 1005, 1006: without a code
 _MAY_RETURN = frozenset((0, 1000, 1001, 1005, 1006, 1011, 4002, 4003))
@@ -45,7 +38,8 @@ _ANSWERED = frozenset(
     "seek branch study_point configure delete divide extrude merge bridge sharpen paint set_rest_shape cut uncut "
     "undo redo probe".split()
 )
-_NOT_OF_AN_ORDER = frozenset(("tool_idle",))
+# errors that tell what has happened (protocol/README.md, "Errors")
+_NOT_OF_AN_ORDER = frozenset(("tool_idle", "tool_handed_over", "undone", "quality"))
 
 T = TypeVar("T")
 
@@ -57,32 +51,6 @@ class Answer:
     verb: str
     text: str
     numbers: dict[str, float]
-
-
-@dataclass(frozen=True)
-class _Loaded:
-    """An asset and the decoder of its frames; the path names the content, so it may be used again."""
-
-    path: str
-    asset: Asset
-    decoder: FrameDecoder
-
-
-@dataclass(eq=False)
-class _Part:
-    """One part and its newest messages. Those of frame, field and interior are decoded when they are asked for."""
-
-    info: Message
-    epoch: int
-    path: str
-    loaded: _Loaded | None = None
-    table: U32 | None = None
-    inside: Asset | None = None
-    asked_inside: bool = False
-    frame: bytes | None = None
-    field: bytes | None = None
-    interior: bytes | None = None
-    early_deltas: list[bytes] = dataclasses.field(default_factory=list)  # came before the asset
 
 
 @dataclass(eq=False)
@@ -141,12 +109,11 @@ class Session:
         self._joined = False  # hello has come on this connection
         self._n_join = 0
         self._lost = ""  # why there is no connection
-        self._subscribed: dict[int, Message] = {}  # by part
         self._status: Message | None = None
         self._members: list[Message] = []
         self._id = 0
         self._own_tool: int | None = None
-        self._parts: list[_Part] = []
+        self._parts = Parts(url, self._changed, lambda: self._joined, self._fail)
         self._tools: Tools | None = None
         self._haptic: Haptic | None = None
         self._pose_seq = 0
@@ -200,7 +167,7 @@ class Session:
     def parts(self) -> list[Message]:
         """The present parts: name, epoch, n_vertex, n_triangle, fields and the rest of their description."""
         with self._changed:
-            return [part.info for part in self._parts]
+            return [part.info for part in self._parts.all]
 
     @property
     def tool(self) -> int | None:
@@ -216,13 +183,13 @@ class Session:
 
     def asset(self, part: int = 0, timeout: float = 60.0) -> Asset:
         """Rest shape and triangles of a part; loaded in the background after join and after each new epoch."""
-        return self._wait(lambda: self._part(part).loaded, timeout, f"the asset of part {part} has not come").asset
+        return self._wait(lambda: self._parts.at(part).loaded, timeout, f"the asset of part {part} has not come").asset
 
     def triangles(self, part: int = 0, timeout: float = 60.0) -> U32:
         """The present triangles of a part, [t][3], a copy; without the empty slots of an adaptive part."""
 
         def shown() -> U32 | None:
-            table = self._part(part).table
+            table = self._parts.at(part).table
             return None if table is None else table[table.any(axis=1)]
 
         return self._wait(shown, timeout, f"the asset of part {part} has not come")
@@ -231,7 +198,7 @@ class Session:
         """The newest frame of a part; with `after` another than that one. A part at rest has no newer frame."""
 
         def newest() -> tuple[FrameDecoder, bytes] | None:
-            found = self._part(part)
+            found = self._parts.at(part)
             if found.loaded is None or found.frame is None:
                 return None
             moment = (found.epoch, _number(found.frame, 12, 4), _number(found.frame, 16, 8))
@@ -249,11 +216,7 @@ class Session:
         if interior:
             message["interior"] = True
         with self._changed:
-            found = self._part(part)
-            if interior and "interior" not in found.info:
-                raise PalpateError(f"part {part} has no interior")
-            self._subscribed[part] = message
-            self._load_inside(found, message)
+            self._parts.subscribe(part, message)
             self._send(message)
 
     def field(self, part: int = 0, after: Field | None = None, timeout: float = 60.0) -> Field:
@@ -261,7 +224,7 @@ class Session:
         ones."""
 
         def newest() -> tuple[bytes, int] | None:
-            found = self._part(part)
+            found = self._parts.at(part)
             old = after and (after.epoch, after.sim_time_us)
             if found.loaded is None or found.field is None or (found.epoch, _number(found.field, 16, 8)) == old:
                 return None
@@ -273,13 +236,13 @@ class Session:
     def interior_asset(self, part: int = 0, timeout: float = 60.0) -> Asset:
         """Nodes at rest inside a part whose interior is subscribed, and in tetrahedra_of(asset.triangles) the
         tetrahedra between them."""
-        return self._wait(lambda: self._part(part).inside, timeout, f"the interior of part {part} has not come")
+        return self._wait(lambda: self._parts.at(part).inside, timeout, f"the interior of part {part} has not come")
 
     def interior(self, part: int = 0, after: Interior | None = None, timeout: float = 60.0) -> Interior:
         """The newest displacements and values inside a part whose interior is subscribed; `after` as for field()."""
 
         def newest() -> tuple[bytes, int] | None:
-            found = self._part(part)
+            found = self._parts.at(part)
             old = after and (after.epoch, after.sim_time_us)
             if found.inside is None or found.interior is None or (found.epoch, _number(found.interior, 16, 8)) == old:
                 return None
@@ -384,11 +347,6 @@ class Session:
                     self._order = None
 
     # under the lock
-
-    def _part(self, index: int) -> _Part:
-        if not 0 <= index < len(self._parts):
-            raise PalpateError(f"there is no part {index}, the session has {len(self._parts)}")
-        return self._parts[index]
 
     def _own(self) -> Tool | None:
         index = self._own_tool
@@ -528,7 +486,7 @@ class Session:
     async def _connect(self) -> Disconnected:
         names = [Subprotocol(wire.PROTOCOL)] + ([Subprotocol("ticket." + self._ticket)] if self._ticket else [])
         async with websockets.client.connect(
-            self._url, subprotocols=names, compression=None, max_size=_MESSAGE_MAX, open_timeout=10, close_timeout=2
+            self._url, subprotocols=names, compression=None, max_size=MESSAGE_MAX, open_timeout=10, close_timeout=2
         ) as socket:
             await socket.send(json.dumps(self._wanted))
             async for data in socket:
@@ -536,7 +494,7 @@ class Session:
                     cycle = self._take(data)
                     if self._joined and self._socket is None:
                         self._socket = socket
-                        for message in self._subscribed.values():
+                        for message in self._parts.subscribed.values():
                             self._start(json.dumps(message))
                     self._changed.notify_all()
                 if cycle is not None:
@@ -559,54 +517,16 @@ class Session:
         if self._own_tool is not None:
             self._wanted["tool"] = self._own_tool
             self._own_tool = None
-        for part in self._parts:
-            part.frame = part.field = part.interior = None
+        self._parts.forget()
         if self._order and not self._order.answer:
             text = f"the connection was lost before {self._order.verb} was answered: {lost}"
             self._order.error = Disconnected(lost.code, text)
 
-    # assets, in threads of their own: nobody waits for those of a server that sends no more
-
-    def _load_soon(self, part: _Part, path: str, take: Callable[[_Part, str, Asset], None]) -> None:
-        threading.Thread(target=self._load, args=(part, path, take), name="palpate asset", daemon=True).start()
-
-    def _load(self, part: _Part, path: str, take: Callable[[_Part, str, Asset], None]) -> None:
-        """Fetches and decodes an asset; its failure ends the session, unless the connection is lost or the part
-        replaced, when another one is loaded."""
-        try:
-            take(part, path, decode_asset(get(self._url, path, _ASSET_MAX, _ASSET_S)))
-        except (OSError, ValueError, http.client.HTTPException, PalpateError) as error:
-            network = not isinstance(error, (urllib.error.HTTPError, ValueError, PalpateError))
-            with self._changed:
-                if network and self._reconnect:
-                    self._changed.wait_for(lambda: part not in self._parts or not self._joined, _NOTICE_S)
-                if part not in self._parts or not self._joined:
-                    return
-                name = part.info.get("name", "")
-                self._error = self._error or PalpateError(f"an asset of part {name} is not loaded: {error}")
-                self._changed.notify_all()
-            self._end_soon()
-
-    def _take_asset(self, part: _Part, path: str, asset: Asset) -> None:
-        loaded = _Loaded(path, asset, FrameDecoder(asset))
-        with self._changed:
-            part.loaded, part.table = loaded, asset.triangles.copy()
-            for data in part.early_deltas:
-                self._take_part(part, wire.TOPOLOGY_DELTA, data)
-            part.early_deltas = []
-            self._changed.notify_all()
-
-    def _take_inside(self, part: _Part, _: str, asset: Asset) -> None:
-        tetrahedra_of(asset.triangles)
-        with self._changed:
-            part.inside = asset
-            self._changed.notify_all()
-
-    def _load_inside(self, part: _Part, subscribed: Message) -> None:
-        path = part.info.get("interior")
-        if subscribed.get("interior") and not part.asked_inside and isinstance(path, str):
-            part.asked_inside = True
-            self._load_soon(part, path, self._take_inside)
+    def _fail(self, error: PalpateError) -> None:
+        """Ends the session; under the lock."""
+        self._error = self._error or error
+        self._changed.notify_all()
+        self._end_soon()
 
     # messages, under the lock
 
@@ -622,27 +542,8 @@ class Session:
         if kind == wire.HAPTIC:
             self._haptic = read_haptic(data)
         elif kind in (wire.FRAME, wire.FIELD, wire.INTERIOR, wire.TOPOLOGY_DELTA):
-            index, _ = epoch_of(data)
-            if index < len(self._parts):
-                self._take_part(self._parts[index], kind, data)
+            self._parts.take(kind, data)
         return None
-
-    def _take_part(self, part: _Part, kind: int, data: bytes) -> None:
-        if epoch_of(data)[1] != part.epoch:
-            return  # of an older epoch: control overtakes frames, so `topology` comes before the frames of its epoch
-        if kind == wire.FRAME:
-            part.frame = data
-        elif kind == wire.FIELD:
-            part.field = data
-        elif kind == wire.INTERIOR:
-            part.interior = data
-        elif part.loaded is None or part.table is None:
-            n_byte = len(data) + sum(map(len, part.early_deltas))
-            need(n_byte <= _MESSAGE_MAX, "COUNT", "too many changes of triangles have come before their asset")
-            part.early_deltas.append(data)
-        else:
-            delta = decode_topology_delta(data, len(part.table), len(part.loaded.asset.rest_m))
-            part.table[delta.slots] = delta.triangles
 
     def _take_control(self, message: Message) -> None:
         kind = message["type"]
@@ -652,12 +553,12 @@ class Session:
                 raise WireError("JSON", "a hello does not say who this member is")
             self._id = whole(you, "id")
             self._own_tool = None if you.get("tool") is None else whole(you, "tool")
-            self._replace_parts(objects(message, "parts"), True)
+            self._parts.replace(objects(message, "parts"), True)
             self._hello = message
             self._joined = True
             self._n_join += 1
         elif kind == "topology":
-            self._replace_parts(objects(message, "parts"), False)
+            self._parts.replace(objects(message, "parts"), False)
         elif kind == "status":
             self._status = message
         elif kind == "members":
@@ -675,21 +576,3 @@ class Session:
             self._order.answer = Answer(self._order.verb, str(message.get("text", "")), numbers)
         elif kind == "error" and self._order and message.get("code") not in _NOT_OF_AN_ORDER:
             self._order.error = OrderRefused(text_of(message, "code"), text_of(message, "text"))
-
-    def _replace_parts(self, infos: list[Message], anew: bool) -> None:
-        """New parts, and those of a new epoch, load their assets; the others stay, but on a connection made anew, where
-        changes of triangles begin at the asset again."""
-        before, self._parts = self._parts, []
-        known = {part.path: part.loaded for part in before if part.loaded}
-        for index, info in enumerate(infos):
-            epoch, path = whole(info, "epoch"), text_of(info, "asset")
-            part = before[index] if index < len(before) else None
-            if anew or part is None or (part.epoch, part.path) != (epoch, path):
-                part = _Part(info, epoch, path, known.get(path))
-                if part.loaded:
-                    part.table = part.loaded.asset.triangles.copy()
-                else:
-                    self._load_soon(part, path, self._take_asset)
-            part.info = info
-            self._parts.append(part)
-            self._load_inside(part, self._subscribed.get(index, {}))

@@ -56,7 +56,8 @@ const char *pal_field_title(pal_field field); /* for sentences: "von Mises stres
 /* values of a field at the shown vertices, written by its component and valid while that exists */
 typedef struct pal_shown_field {
     float *value;                /* SI                                    [n_shown] */
-    double *node;                /* the same at the nodes, NULL: not computed [n_node] */
+    double *node;                /* the same at the nodes                     [n_node] */
+    float *moved;                /* m, displacement of the nodes then         [n_node][3] */
     uint64_t revision;           /* different for every set of values               */
     double time_s;               /* simulated time at which they were computed      */
     double kinetic_J, elastic_J; /* of the body then; of the field energy only   */

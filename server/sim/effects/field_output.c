@@ -2,9 +2,9 @@
  * (pal_world_field) or where the scene has an entry for it; the simulation does not depend on it.
  *
  * Every FORCE component that can measure adds its value times volume, and the volume, to the nodes of its elements; a
- * node shows the quotient, and a skinned vertex the mean of its nodes with the skin's weights. Displacement is the
- * distance of a shown vertex from its rest position. A number that is not finite is shown as 0, as are inactive
- * vertices of an adaptive body.
+ * node shows the quotient, and a skinned vertex the mean of its nodes with the skin's weights. The displacements of all
+ * nodes at that moment stand beside the values. Displacement is the distance of a shown vertex from its rest position.
+ * A number that is not finite is shown as 0, as are inactive vertices of an adaptive body.
  *
  * Keys: field ("displacement" | "von_mises" | "energy" | "stiffness" | "strain" | "distortion" | "young" |
  * "density" | "damping"), rate_hz (10: updates per simulated second). */
@@ -44,7 +44,8 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     if (!out || !value) return PAL_ERR_MEMORY;
     *out =
         (field_output){.kind = kind, .shown.value = value, .period_s = 1 / rate_hz, .next_s = -INFINITY, .body = body};
-    const bool all = PAL_NEW_DOUBLES(build->arena, body->n_node, &out->shown.node) &&
+    out->shown.moved = PAL_NEW(build->arena, float, 3 * body->n_node);
+    const bool all = out->shown.moved && PAL_NEW_DOUBLES(build->arena, body->n_node, &out->shown.node) &&
                      (kind == PAL_FIELD_DISPLACEMENT_M || PAL_NEW_DOUBLES(build->arena, body->n_node, &out->volume_m3));
     if (!all) return PAL_ERR_MEMORY;
     body->display.field[kind] = &out->shown;
@@ -119,6 +120,8 @@ static pal_err run(void *self, pal_step *step)
         displacement(step->body, out->shown.node, out->shown.value);
     else
         measured(out, step);
+    for (int i = 0; i < 3 * out->body->n_node; i++)
+        out->shown.moved[i] = (float)(out->body->d[i] - out->body->node_rest[i]);
     out->shown.revision = ++out->body->display.field_revision;
     out->shown.time_s = step->time_s;
     out->next_s += out->period_s;

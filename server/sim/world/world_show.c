@@ -10,11 +10,11 @@
 #include <stdio.h>
 #include <string.h>
 
-static void copy_nodes(const pal_body *body, const double *value, int n_node, float *to)
+static void copy_nodes(const pal_shown_field *from, int n_node, float *to)
 {
     for (int i = 0; i < n_node; i++, to += 4) {
-        for (int c = 0; c < 3; c++) to[c] = (float)(body->d[3 * i + c] - body->node_rest[3 * i + c]);
-        to[3] = (float)value[i];
+        for (int c = 0; c < 3; c++) to[c] = from->moved[3 * i + c];
+        to[3] = (float)from->node[i];
         for (int c = 0; c < 4; c++) to[c] = isfinite(to[c]) ? to[c] : 0;
     }
 }
@@ -35,7 +35,7 @@ static void copy_fields(const pal_shown *shown, const pal_body *body, pal_frame_
         if (!from || !field->value || field->revision == from->revision) continue;
         memcpy(field->value, from->value, sizeof(float) * (size_t)shown->n_own);
         fill_copies(shown, field->value, sizeof(float));
-        if (field->node) copy_nodes(body, from->node, to->n_node, field->node);
+        if (field->node) copy_nodes(from, to->n_node, field->node);
         field->revision = from->revision;
         field->time_s = from->time_s;
         if (k == PAL_FIELD_ENERGY_J_M3) to->kinetic_J = from->kinetic_J, to->elastic_J = from->elastic_J;

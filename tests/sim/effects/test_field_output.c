@@ -312,6 +312,43 @@ static void nodes_inside_have_the_linear_displacement_and_its_strain(void)
     tool_scene_close(&s);
 }
 
+/* a frame that is filled after the last values were taken, while the body moves on, has the displacements of their
+ * moment */
+static void nodes_inside_have_displacements_and_values_of_one_moment(void)
+{
+    tool_scene s;
+    REQUIRE(slab_scene(&s, 4, 4, 3, 0.01, 1, 0.008, 15) && tool_scene_open(&s));
+    REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_DISPLACEMENT_M, true, NULL));
+    pal_frame *frame = pal_frame_create(s.world);
+    REQUIRE(frame && !pal_frame_fit(frame, s.world));
+    uint64_t revision = 0;
+    int n_since = 0, n_late = 0;
+    double moved_on = 0;
+    for (int i = 0; i < 120; i++) {
+        const pal_frame_field *in = &frame->part[0].field[PAL_FIELD_DISPLACEMENT_M];
+        const float *node = in->node;
+        press(&s, i < 40 ? i : 40);
+        REQUIRE(step_world(&s, 1));
+        const pal_shown_field *now = s.body->display.field[PAL_FIELD_DISPLACEMENT_M];
+        if (now->revision != revision) revision = now->revision, n_since = 0;
+        if (++n_since != 3) continue;
+        n_late++;
+        pal_world_frame(s.world, frame);
+        CHECK_NEAR(in->time_s, now->time_s, 0);
+        /* the value of this field is the length of the displacement, to the rounding of floats of some mm */
+        for (int k = 0; k < s.body->n_node; k++, node += 4) {
+            const double length = pal_norm3((double[3]){(double)node[0], (double)node[1], (double)node[2]});
+            CHECK_NEAR((double)node[3], length, 1e-8);
+            const double present = pal_dist3(s.body->d + 3 * (size_t)k, s.body->node_rest + 3 * (size_t)k);
+            moved_on = fmax(moved_on, fabs(present - length));
+        }
+    }
+    CHECK(n_late >= 2);
+    CHECK(moved_on > 1e-5); /* else nothing was tried */
+    pal_frame_destroy(frame);
+    tool_scene_close(&s);
+}
+
 /* an entry of the scene asks for a field */
 static bool slab_with(tool_scene *s, const char *field, double rate_hz)
 {
@@ -799,6 +836,7 @@ int main(void)
     RUN(values_are_taken_ten_times_a_second_without_heap_and_at_once_after_reset);
     RUN(frames_have_room_for_a_field_while_its_row_is_there);
     RUN(nodes_inside_have_the_linear_displacement_and_its_strain);
+    RUN(nodes_inside_have_displacements_and_values_of_one_moment);
     RUN(refuses_what_the_model_does_not_give_with_a_sentence);
     RUN(an_entry_of_the_scene_keeps_its_row);
     RUN(rows_of_other_bodies_stay_theirs);
