@@ -296,8 +296,7 @@ static pal_err draw(const pal_study_file *file, column_of of, char **svg, size_t
                                                  .dots = true};
     }
     if (any_apart && of != FORCE)
-        plot.y_label =
-            "largest error, mm (hollow: fitted to this load or failed a robustness case, so not on the front)";
+        plot.y_label = "largest error, mm (hollow: excluded from the front; its tip says why)";
     pal_err err = pal_plot_text(&plot, svg, n_byte, diag);
     free(s);
     return err;

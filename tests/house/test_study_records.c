@@ -1,6 +1,6 @@
-/* The three studies of README as they were measured (tests/data/studies, the same files as the plots are drawn from):
- * what is foreseen for a configuration from the others, against what was measured there; the front; what is picked.
- * Recorded milliseconds, so nothing here depends on the machine. */
+/* The three studies of tests/bench/README.md as they were measured (tests/data/studies, the same files as the plots are
+ * drawn from): what is foreseen for a configuration from the others, against what was measured there; the front; what
+ * is picked. Recorded milliseconds, so nothing here depends on the machine. */
 #include "server/study/study_store.h"
 #include "tests/check.h"
 

@@ -190,7 +190,8 @@ static bool continue_answer(pal_tissue_compliance *tissue, pal_tissue_answer **o
         memcpy(a->left, a->force, 3 * sizeof(double) * (size_t)body->n_dof);
     }
     /* half a product is rounding: a step's time is a sum over its sub-steps */
-    while (good && tissue->credit > 0.5 && !is_good(tissue, a)) good = iterate(tissue, a);
+    for (; good && (tissue->credit > 0.5 || !tissue->iterated) && !is_good(tissue, a); tissue->iterated = true)
+        good = iterate(tissue, a);
     if (!isfinite(dot(body, a->left, a->left))) a->size2 = 0;
     return a->size2 > 0 && is_good(tissue, a);
 }
@@ -200,6 +201,7 @@ static bool solve(void *self, const pal_body *body, const double *force_N, doubl
     pal_tissue_compliance *tissue = self;
     pal_body *own = tissue->step.body;
     pal_tissue_answer *a = NULL;
+    if (tissue->pauses) return false;
     find_diagonal(tissue);
     memcpy(tissue->x, own->x, 3 * sizeof(double) * (size_t)own->n_dof);
     memset(tissue->product, 0, 3 * sizeof(double) * (size_t)own->n_dof);
@@ -224,8 +226,11 @@ static void begin(void *self, pal_step *step)
     const double since_s = step->time_s > tissue->time_s ? step->time_s - tissue->time_s : 0;
     tissue->step = *step;
     tissue->time_s = step->time_s;
+    if (!(since_s > 0)) return;
     /* what was not used in a step is not saved up */
-    if (since_s > 0) tissue->credit = fmin(tissue->credit, 0) + PAL_PROBES_1_S * step->dt_s * step->n_sub;
+    tissue->credit = fmin(tissue->credit, 0) + PAL_PROBES_1_S * step->dt_s * step->n_sub;
+    tissue->pauses = tissue->credit <= 1e-6; /* 0 but for rounding */
+    tissue->iterated = false;
 }
 
 static void destroy(void *self)

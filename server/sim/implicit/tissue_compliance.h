@@ -5,10 +5,11 @@
  *
  * A product costs two evaluations of forces, so few are made in a step (PAL_PROBES_1_S), and the answer to a
  * load continues in the next one: residual and direction stay, the residual is found again as the body moves, and beta
- * is Polak and Ribiere's, which does not need K to be quite the same. An answer counts once its error is below
- * PAL_SEARCH_TOLERANCE; until then there is none. One that is worse than no answer, as where K was found at a fold, is
- * forgotten. Built only where a CONTACT component asks for it, and not without supports. Thread: [load] to make, then
- * [sim]. */
+ * is Polak and Ribiere's, which does not need K to be quite the same. A step that is too short for a residual and an
+ * iteration makes both, and the steps after it make none until their share has paid for them. An answer counts once its
+ * error is below PAL_SEARCH_TOLERANCE; until then there is none. One that is worse than no answer, as where K was found
+ * at a fold, is forgotten. Built only where a CONTACT component asks for it, and not without supports. Thread: [load]
+ * to make, then [sim]. */
 #ifndef PAL_SIM_IMPLICIT_TISSUE_COMPLIANCE_H
 #define PAL_SIM_IMPLICIT_TISSUE_COMPLIANCE_H
 #include "server/sim/implicit/rest_stiffness.h"
@@ -28,6 +29,8 @@ typedef struct pal_tissue_compliance {
     pal_compliance hook; /* what the body publishes */
     pal_step step;       /* the present one         */
     double credit;       /* products that may be made now */
+    bool pauses;         /* in this step nothing is computed, as steps before it made more than their share */
+    bool iterated;       /* an iteration was made in this step, which the first answer always gets */
     double time_s;       /* of the step that credit is for */
     uint64_t n_call, revision;
     bool known;                    /* inverse holds for the topology `revision` */

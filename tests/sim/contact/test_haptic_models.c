@@ -5,7 +5,7 @@
 #include "tests/fixtures/model_scenes.h"
 
 static const double depth_m = 0.002, speed_m_s = 0.02, friction = 0.4;
-enum { SETTLE = 150 }; /* steps: 2.5 s, after which forces differ by less than 1e-4 */
+enum { SETTLE = 150 }; /* 60ths of a second: 2.5 s, after which forces differ by less than 1e-4 */
 
 static const pal_tool *tool_of(const model_scene *m)
 {
@@ -19,7 +19,7 @@ static bool hold(model_scene *m, const double at[3], bool grasp)
     return !pal_world_pose(m->world, 0, &pose) && model_scene_steps(m, 1);
 }
 
-/* from `at` to `to` in a straight line, then `settle` steps; at = to */
+/* from `at` to `to` in a straight line, then `settle` 60ths of a second; at = to */
 static bool go(model_scene *m, double at[3], const double to[3], int settle, bool grasp)
 {
     const int n = (int)ceil(pal_dist3(at, to) / (speed_m_s * m->scene->step_s));
@@ -29,14 +29,15 @@ static bool go(model_scene *m, double at[3], const double to[3], int settle, boo
         for (int c = 0; c < 3; c++) at[c] = from[c] + (to[c] - from[c]) * i / n;
         if (!hold(m, at, grasp)) return false;
     }
-    return model_scene_steps(m, settle);
+    return model_scene_steps(m, (int)lround(settle / (60 * m->scene->step_s)));
 }
 
 /* a tool of 12 mm that just touches the top of a body of some 8 cm */
-static bool begin(model_scene *m, model_kind kind, double mu, double at[3])
+static bool begin_in_steps(model_scene *m, model_kind kind, double mu, double step_s, double at[3])
 {
     const bool box = kind == SPRINGS || kind == FEM;
     model_scene_make(m, kind);
+    if (step_s > 0) m->scene->step_s = step_s;
     if (box) {
         if (kind == FEM) pal_hexes_free(&m->mesh.hexes);
         box_free(&m->mesh);
@@ -59,6 +60,11 @@ static bool begin(model_scene *m, model_kind kind, double mu, double at[3])
         if (at[2] < 0 || !hold(m, at, false)) return false;
     }
     return true;
+}
+
+static bool begin(model_scene *m, model_kind kind, double mu, double at[3])
+{
+    return begin_in_steps(m, kind, mu, 0, at);
 }
 
 /* what changes from model to model in n steps about `at`, the hand trembling by tremor_m: parts of k1, m of the plane
@@ -126,6 +132,30 @@ static void a_resting_hand_has_a_steady_model_of_the_right_stiffness(void)
             CHECK_LE(still.force, 1e-6);
             CHECK_NEAR(published, slope, (kind == SHELL ? 0.12 : 0.06) * slope);
         }
+        model_scene_close(&m);
+    }
+}
+
+/* steps of 1/240 s have products for half an iteration, those of 1 ms for an eighth: a longer way, the same stiffness
+ */
+static void short_steps_find_the_same_stiffness(void)
+{
+    static const double step_s[] = {1.0 / 240, 1e-3};
+    for (int k = 0; k < 2; k++) {
+        model_scene m;
+        double at[3], less[3], more[3];
+        const double half_m = 0.0005;
+        REQUIRE(begin_in_steps(&m, SPRINGS, 0, step_s[k], at));
+        /* in one step, so that forces along the way tell nothing */
+        at[2] -= depth_m;
+        REQUIRE(hold(&m, at, false) && go(&m, at, (double[]){at[0], at[1], at[2]}, SETTLE, false));
+        const pal_contact_patch patch = tool_of(&m)->patch[0];
+        REQUIRE(force_at(&m, at, 0, 0, half_m, false, less) && force_at(&m, at, 0, 0, -half_m, false, more));
+        const double slope = (more[2] - less[2]) / (2 * half_m),
+                     published = patch.k1_N_m * patch.normal[2] * patch.normal[2];
+        printf("  steps of %.2g ms: k1 %.4g, slope %.4g N/m (%+.1f %%)\n", 1e3 * step_s[k], published, slope,
+               100 * (published / slope - 1));
+        CHECK_NEAR(published, slope, 0.06 * slope);
         model_scene_close(&m);
     }
 }
@@ -315,6 +345,7 @@ static void a_turning_tool_drags_by_its_surface(void)
 int main(void)
 {
     RUN_LONG(a_resting_hand_has_a_steady_model_of_the_right_stiffness);
+    RUN_LONG(short_steps_find_the_same_stiffness);
     RUN_LONG(a_grasp_has_the_tangent_stiffness_of_tissue);
     RUN_LONG(friction_is_what_the_patch_says);
     RUN_LONG(torque_is_that_of_friction_and_of_the_grasp);
