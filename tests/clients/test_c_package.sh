@@ -11,8 +11,8 @@ for tool in cc pkg-config cmake; do
     }
 done
 cmake --install "$bin/.." --prefix "$work/usr" --component dev >"$work/install.log" || exit 1
-# 15 headers, the library, its .pc
-check "files of the package" "$(find "$work/usr" -type f | wc -l)" == 17
+# 15 headers, the library, its .pc, the licence
+check "files of the package" "$(find "$work/usr" -type f | wc -l)" == 18
 export PKG_CONFIG_PATH="$work/usr/lib/pkgconfig"
 flags=$(pkg-config --cflags --libs palpate-client) || exit 1
 check "its version is that of the programs" "\"$(pkg-config --modversion palpate-client)\"" == \
