@@ -174,6 +174,11 @@ static void join(viewer *v, const pal_wire_join *wanted)
     all->count.n_viewer++, all->count.n_joined++;
     v->peer->ops->ready(v->peer);
     if (wanted->role != PAL_WIRE_ROLE_VIEWER) refuse(v, "role", "this is a relay: here you may only watch");
+    pthread_mutex_lock(&all->kept->lock);
+    const bool adaptive = all->kept->adaptive;
+    pthread_mutex_unlock(&all->kept->lock);
+    if (adaptive && wanted->topology_deltas)
+        refuse(v, "topology", "a relay shows a part that adapts with the triangles of its start");
 }
 
 /* ---- what viewers say ---- */
@@ -197,7 +202,9 @@ static int control(viewer *v, const uint8_t *bytes, size_t n_byte)
         answer(v, &pong);
         break;
     case PAL_CONTROL_SUBSCRIBE_FIELD:
-        if (strcmp(in.field_subscription.field, "none")) refuse(v, "field", "a relay shows no fields");
+        if (in.field_subscription.interior || in.field_subscription.energy ||
+            strcmp(in.field_subscription.field, "none"))
+            refuse(v, "field", "a relay shows no fields, insides and energies: the server itself does");
         break;
     case PAL_CONTROL_RELEASE_TOOL:
         break;
