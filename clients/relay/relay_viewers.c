@@ -370,8 +370,8 @@ static void wake(void *user)
 static void tick(void *user)
 {
     pal_relay_viewers *all = user;
-    const uint64_t now = pal_loop_now_ns(all->loop);
     wake(all);
+    const uint64_t now = pal_loop_now_ns(all->loop); /* not before what wake has noted */
     for (viewer *v = all->place; v < all->place + all->n_place; v++) {
         if (!v->peer || v->peer->drop_code) continue;
         if (!v->joined && now - v->opened_ns > PAL_RELAY_JOIN_NS)
