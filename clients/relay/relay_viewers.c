@@ -4,6 +4,7 @@
 #include "server/base/log.h"
 #include "server/net/transport/credit.h"
 #include "server/net/transport/host_name.h"
+#include "server/net/transport/relay_list.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -166,7 +167,7 @@ static void join(viewer *v, const pal_wire_join *wanted)
     const bool full = !has_place(v);
     if (full || (all->admission && pal_admission_enter(all->admission, &v->grant, pal_loop_now_ns(all->loop)))) {
         all->count.n_refused++;
-        pal_peer_drop(v->peer, PAL_WIRE_CLOSE_FULL, "%s",
+        pal_peer_drop(v->peer, full && all->options.relays ? PAL_WIRE_CLOSE_ELSEWHERE : PAL_WIRE_CLOSE_FULL, "%s",
                       full ? "the relay has no free place" : "as many as this ticket admits are here, or have been");
         return;
     }
@@ -412,6 +413,7 @@ pal_err pal_relay_viewers_create(pal_loop *loop, pal_relay_kept *kept, const pal
     all->n_place = all->max_viewers + PAL_RELAY_UNJOINED;
     all->place = calloc((size_t)all->n_place, sizeof *all->place);
     if (!all->place) err = PAL_ERR_MEMORY;
+    if (!err) err = pal_relay_list_check(options->relays, "--relays", diag);
     if (!err && options->keys) err = pal_admission_create(options->keys, false, diag, &all->admission);
     if (err) return pal_relay_viewers_destroy(all), err;
     pal_loop_listen(loop, &(pal_loop_events){wake, tick, all});

@@ -21,9 +21,9 @@
 #include <time.h>
 #include <unistd.h>
 
-/* START: bytes of a payload that every viewer looks at. AT_ONCE: half of the connections of one address that a server
- * lets wait before they join */
-enum { START = 48, AT_ONCE = 8, EVENTS = 256, RECENT = 1024, MESSAGE_MAX = 1 << 22 };
+/* START: bytes of a payload that every viewer looks at. AT_ONCE: by a gate, below the connections of one address that
+ * it lets wait before they join */
+enum { START = 48, AT_ONCE = 12, EVENTS = 256, RECENT = 1024, MESSAGE_MAX = 1 << 22 };
 enum { OP_TEXT = 1, OP_BINARY = 2, OP_CLOSE = 8, OP_PING = 9, OP_PONG = 10 };
 
 typedef enum viewer_state { AWAY, UPGRADES, ENTERS, JOINED } viewer_state;
@@ -319,7 +319,7 @@ static void follow(hall *h)
     int next = 0;
     for (int phase; (phase = atomic_load(&c->phase)) != CROWD_LEAVES;) {
         if (phase == CROWD_MEASURES && !h->measures) h->measures = true, h->cpu_ns = own_cpu_ns();
-        for (int i = 0; phase == CROWD_JOINS && i < c->n_viewer && h->n_entering < AT_ONCE; i++) {
+        for (int i = 0; phase == CROWD_JOINS && i < c->n_viewer && h->n_entering < AT_ONCE * c->n_gate; i++) {
             next = (next + 1) % c->n_viewer;
             if (h->viewer[next].state == AWAY) enter(h, &h->viewer[next]);
         }

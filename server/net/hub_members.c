@@ -176,7 +176,10 @@ static bool enter(pal_client *c, pal_wire_role role, const char *name)
     const uint64_t now = pal_loop_now_ns(c->hub->loop);
     const char *full = "the server has no free place";
     pal_err err = PAL_ERR_FULL;
-    if (has_place(c, role)) {
+    int code = PAL_WIRE_CLOSE_FULL;
+    if (!has_place(c, role)) {
+        if (role == PAL_WIRE_ROLE_VIEWER && c->hub->relays) code = PAL_WIRE_CLOSE_ELSEWHERE;
+    } else {
         full = "as many as this ticket admits are here, or have been";
         err = pal_admission_enter(c->hub->admission, &c->grant, now);
         if (!err) {
@@ -188,7 +191,7 @@ static bool enter(pal_client *c, pal_wire_role role, const char *name)
     if (!err) return true;
     c->id = 0;
     c->hub->count.n_refused_join++;
-    pal_hub_drop(c, PAL_WIRE_CLOSE_FULL, "%s", err == PAL_ERR_STATE ? "an instructor has locked the session" : full);
+    pal_hub_drop(c, code, "%s", err == PAL_ERR_STATE ? "an instructor has locked the session" : full);
     return false;
 }
 

@@ -39,7 +39,7 @@ _ASSET_S = 60.0  # in which the server must go on sending an asset
 _NOTICE_S = 2.0  # in which the websocket of a server that has fallen ends as its files do
 _PAUSE_FIRST_S, _PAUSE_MAX_S = 0.25, 5.0  # before joining again; each is twice the one before
 # closures after which a client joins again (protocol/README.md, "Closing"); 0, 1005, 1006: without a code
-_MAY_RETURN = frozenset((0, 1000, 1001, 1005, 1006, 1011, 4002, 4003))
+_MAY_RETURN = frozenset((0, 1000, 1001, 1005, 1006, 1011, 4002, 4003, 4006))
 # orders that end with an `answer`; the others are done, or refused, before the `pong` of a ping behind them
 _ANSWERED = frozenset(
     "seek branch study_point configure delete divide extrude merge bridge sharpen paint set_rest_shape cut uncut "
