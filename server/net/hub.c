@@ -370,7 +370,7 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
     hub->max_members = options->max_clients > 0 ? options->max_clients : PAL_HUB_CLIENTS;
     hub->relays = options->relays && options->relays[0] ? options->relays : NULL;
     hub->max_viewers = options->max_viewers > 0 ? options->max_viewers : PAL_HUB_VIEWERS;
-    hub->max_clients = hub->max_members + hub->max_viewers + PAL_UNJOINED_PLACES;
+    hub->max_clients = hub->max_members + hub->max_viewers + PAL_VIEWING_TICKETS + PAL_UNJOINED_PLACES;
     hub->client = calloc((size_t)hub->max_clients, sizeof *hub->client);
     hub->control = malloc(sizeof *hub->control);
     hub->text = malloc(PAL_CONTROL_OUT_MAX + 1);

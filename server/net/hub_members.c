@@ -132,10 +132,12 @@ static bool has_place(const pal_client *c, pal_wire_role role)
     }
     if (role == PAL_WIRE_ROLE_INSTRUCTOR) return n < hub->max_members;
     /* from this machine comes a proxy for everybody, and whoever is here can do worse than fill places */
-    const bool counted = !pal_address_is_loopback(c->grant.address) && !c->grant.ticket.uses && !c->grant.ticket.user;
+    const bool made_for = c->grant.ticket.uses || c->grant.ticket.user;
+    const bool counted = !pal_address_is_loopback(c->grant.address) && !made_for;
+    const int viewers = hub->max_viewers + (made_for ? PAL_VIEWING_TICKETS : 0);
     if (watches && of_address < hub->max_viewers / PAL_VIEWING_ADDRESSES)
         of_address = hub->max_viewers / PAL_VIEWING_ADDRESSES;
-    return n < (watches ? hub->max_viewers : hub->max_members - kept) && (!counted || n_address < of_address);
+    return n < (watches ? viewers : hub->max_members - kept) && (!counted || n_address < of_address);
 }
 
 /* an id that no other viewer of the room has */

@@ -1,9 +1,12 @@
 /* Members of a server that nobody enters without a ticket: roles, rights that instructors give, tools that they hand
  * over, who is put out, and places. */
+#include "server/net/admission/ticket_keys.h"
 #include "server/net/transport/relay_list.h"
 #include "server/net/tuning.h"
 #include "tests/net/hub_scene.h"
 #include "tests/net/server_fixture.h"
+
+#include <unistd.h>
 
 static small_scene organ;
 static char ticket[PAL_WIRE_ROLE_COUNT][PAL_TICKET_TEXT];
@@ -342,6 +345,33 @@ static void who_finds_no_place_to_watch_is_sent_to_relays(void)
     end();
 }
 
+/* a relay is a viewer too: with a ticket of its own it comes back into a server that a crowd has filled meanwhile */
+static void a_ticket_of_ones_own_finds_a_place_to_watch(void)
+{
+    static char path[] = "/tmp/palpate_members_keys_XXXXXX";
+    static mem_client guest[PAL_VIEWING_TICKETS + 1];
+    mem_client crowd[2];
+    pal_ticket_keys keys;
+    char text[PAL_TICKET_TEXT];
+    int id = 0, fd = mkstemp(path);
+    REQUIRE(fd >= 0 && !close(fd) && !unlink(path) && !pal_key_file_add(path, &id, NULL));
+    REQUIRE(!pal_ticket_keys_read(path, &keys, NULL));
+    const pal_ticket ticket_of_relay = {.role = PAL_WIRE_ROLE_VIEWER, .user = 7, .nonce = 1};
+    CHECK(pal_ticket_put(&ticket_of_relay, &keys.key[0], text));
+    begin_server((pal_server_options){.max_viewers = 1, .key_file = path});
+    for (int i = 0; i < 2; i++) join(&crowd[i], "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    CHECK_INT(pal_mem_code(crowd[1].peer), PAL_WIRE_CLOSE_FULL);
+    for (int i = 0; i <= PAL_VIEWING_TICKETS; i++) {
+        mem_connect(&guest[i], transport, "192.0.2.7", text);
+        mem_enter(&guest[i], "relay", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE, false);
+        CHECK_INT(pal_mem_code(guest[i].peer), i < PAL_VIEWING_TICKETS ? 0 : PAL_WIRE_CLOSE_FULL);
+    }
+    for (int i = 0; i <= PAL_VIEWING_TICKETS; i++) mem_end(&guest[i]);
+    mem_end(&crowd[0]), mem_end(&crowd[1]);
+    end();
+    unlink(path);
+}
+
 static void what_is_no_address_of_a_relay_is_refused(void)
 {
     static const char *const wrong[] = {"relay:8092",       "javascript:alert(1)", "http://a/,ftp://b/",
@@ -454,6 +484,7 @@ int main(void)
     RUN(places_are_kept_for_instructors);
     RUN(viewers_and_members_take_no_place_of_each_other);
     RUN(who_finds_no_place_to_watch_is_sent_to_relays);
+    RUN(a_ticket_of_ones_own_finds_a_place_to_watch);
     RUN(what_is_no_address_of_a_relay_is_refused);
     RUN(a_crowd_of_viewers_leaves_the_members_listed);
     RUN(viewers_of_one_address_keep_no_others_out);
