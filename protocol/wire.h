@@ -50,7 +50,8 @@ typedef enum pal_wire_close {
     PAL_WIRE_CLOSE_STALLED = 4002,    /* no acknowledgement for 10 s            */
     PAL_WIRE_CLOSE_FULL = 4003,       /* session has no room for a further peer */
     PAL_WIRE_CLOSE_NO_SESSION = 4004, /* session does not exist or has ended    */
-    PAL_WIRE_CLOSE_REMOVED = 4005     /* an instructor has removed or banned the member */
+    PAL_WIRE_CLOSE_REMOVED = 4005,    /* an instructor has removed or banned the member */
+    PAL_WIRE_CLOSE_ELSEWHERE = 4006   /* no room for who watches: relays have it */
 } pal_wire_close;
 
 /* first 8 bytes of every binary message */

@@ -88,7 +88,7 @@ static bool link_may_return(int code)
 {
     return code == 0 || code == PAL_WIRE_CLOSE_NORMAL || code == PAL_WIRE_CLOSE_GOING_AWAY || code == 1005 ||
            code == 1006 || code == PAL_WIRE_CLOSE_INTERNAL || code == PAL_WIRE_CLOSE_STALLED ||
-           code == PAL_WIRE_CLOSE_FULL;
+           code == PAL_WIRE_CLOSE_FULL || code == PAL_WIRE_CLOSE_ELSEWHERE;
 }
 
 /* the connection is gone: try again later, or end */

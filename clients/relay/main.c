@@ -111,6 +111,8 @@ int main(int argc, char **argv)
         {"--tls-key", "FILE", PAL_FLAG_TEXT, &r.address.tls_key, 0, 0, "key of that certificate, in PEM"},
         {"--keys", "FILE", PAL_FLAG_TEXT, &r.options.keys, 0, 0, "check tickets with this key file (they are not)"},
         {"--viewer", "FOLDER", PAL_FLAG_TEXT, &page, 0, 0, "files of the page (none)"},
+        {"--relays", "URL,...", PAL_FLAG_TEXT, &r.options.relays, 0, 0,
+         "other relays, to which pages go that find no place here (none)"},
         {"--seconds", "S", PAL_FLAG_NUMBER, &seconds, 0.1, 1e9, "end after so long (a signal ends it)"},
         {"--max-viewers", "N", PAL_FLAG_COUNT, &r.options.max_viewers, 1, 10000, "viewers at once (1000)"},
     };

@@ -169,6 +169,8 @@ static void take_hello(pal_relay_kept *k, const pal_wire_hello *h, pal_packet *p
     if (!is_same_run(k, h)) begin_run(k);
     k->started = h->started;
     k->frame_rate_hz = h->frame_rate_hz;
+    k->adaptive = false;
+    for (uint32_t p = 0; p < h->n_part; p++) k->adaptive |= h->part[p].is_adaptive;
     snprintf(k->session, sizeof k->session, "%s", h->session);
     snprintf(k->title, sizeof k->title, "%s", h->title);
     k->up = true;

@@ -44,6 +44,7 @@ typedef struct pal_relay_asset {
 typedef struct pal_relay_kept {
     pthread_mutex_t lock; /* of all that follows, but what is marked [up] */
     bool up;              /* upstream answers */
+    bool adaptive;        /* a part changes its triangles, as hello says */
     uint32_t run;         /* grows when viewers have to begin anew */
     uint64_t number;      /* of the last change */
     double frame_rate_hz;

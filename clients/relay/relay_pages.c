@@ -1,6 +1,7 @@
 #include "clients/relay/relay_pages.h"
 
 #include "server/base/json_members.h"
+#include "server/net/transport/relay_list.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -40,7 +41,7 @@ static bool get_asset(pal_relay_kept *kept, const char *path, pal_reply *reply)
     return true;
 }
 
-static void get_sessions(pal_relay_kept *kept, const pal_relay_counts *count, pal_reply *reply)
+static void get_sessions(pal_relay_kept *kept, const char *others, const pal_relay_counts *count, pal_reply *reply)
 {
     cJSON *sessions = cJSON_CreateArray(), *root = PAL_JSON({"sessions", sessions});
     pthread_mutex_lock(&kept->lock);
@@ -49,6 +50,8 @@ static void get_sessions(pal_relay_kept *kept, const pal_relay_counts *count, pa
                              PAL_JSON({"name", JSON_TEXT(kept->session)}, {"title", JSON_TEXT(kept->title)},
                                       {"viewers", JSON_NUMBER(count->n_viewer)}, {"state", JSON_TEXT("running")}));
     pthread_mutex_unlock(&kept->lock);
+    cJSON *relays = pal_relay_list_json(others);
+    if (relays) cJSON_AddItemToObject(root, "relays", relays);
     char *text = cJSON_PrintUnformatted(root);
     cJSON_Delete(root);
     reply_text(reply, 200, "application/json", text ? text : "{}");
@@ -95,7 +98,7 @@ void pal_relay_get(pal_relay_kept *kept, const pal_relay_options *options, const
     else if (operators && !strcmp(path, "/metrics"))
         get_metrics(count, up, reply);
     else if (!request->health && !strcmp(path, "/sessions"))
-        get_sessions(kept, count, reply);
+        get_sessions(kept, options->relays, count, reply);
     else if (request->health ||
              (!get_asset(kept, path, reply) && !(options->site && pal_site_get(options->site, path, reply))))
         reply_plain(reply, 404, "not found\n");

@@ -8,6 +8,7 @@
 typedef struct pal_relay_options {
     int max_viewers;     /* 0: PAL_RELAY_VIEWERS */
     const char *keys;    /* file of the keys of tickets, which are then checked; NULL: tickets are not looked at */
+    const char *relays;  /* to which who finds no place here is sent (relay_list.h); NULL: none */
     pal_site *site;      /* files of the page, borrowed; NULL: none */
     bool health_on_main; /* health and metrics stand beside the page */
 } pal_relay_options;

@@ -4,6 +4,7 @@
 #include "server/base/log.h"
 #include "server/net/transport/credit.h"
 #include "server/net/transport/host_name.h"
+#include "server/net/transport/relay_list.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -166,7 +167,7 @@ static void join(viewer *v, const pal_wire_join *wanted)
     const bool full = !has_place(v);
     if (full || (all->admission && pal_admission_enter(all->admission, &v->grant, pal_loop_now_ns(all->loop)))) {
         all->count.n_refused++;
-        pal_peer_drop(v->peer, PAL_WIRE_CLOSE_FULL, "%s",
+        pal_peer_drop(v->peer, full && all->options.relays ? PAL_WIRE_CLOSE_ELSEWHERE : PAL_WIRE_CLOSE_FULL, "%s",
                       full ? "the relay has no free place" : "as many as this ticket admits are here, or have been");
         return;
     }
@@ -174,6 +175,11 @@ static void join(viewer *v, const pal_wire_join *wanted)
     all->count.n_viewer++, all->count.n_joined++;
     v->peer->ops->ready(v->peer);
     if (wanted->role != PAL_WIRE_ROLE_VIEWER) refuse(v, "role", "this is a relay: here you may only watch");
+    pthread_mutex_lock(&all->kept->lock);
+    const bool adaptive = all->kept->adaptive;
+    pthread_mutex_unlock(&all->kept->lock);
+    if (adaptive && wanted->topology_deltas)
+        refuse(v, "topology", "a relay shows a part that adapts with the triangles of its start");
 }
 
 /* ---- what viewers say ---- */
@@ -197,7 +203,9 @@ static int control(viewer *v, const uint8_t *bytes, size_t n_byte)
         answer(v, &pong);
         break;
     case PAL_CONTROL_SUBSCRIBE_FIELD:
-        if (strcmp(in.field_subscription.field, "none")) refuse(v, "field", "a relay shows no fields");
+        if (in.field_subscription.interior || in.field_subscription.energy ||
+            strcmp(in.field_subscription.field, "none"))
+            refuse(v, "field", "a relay shows no fields, insides and energies: the server itself does");
         break;
     case PAL_CONTROL_RELEASE_TOOL:
         break;
@@ -363,8 +371,8 @@ static void wake(void *user)
 static void tick(void *user)
 {
     pal_relay_viewers *all = user;
-    const uint64_t now = pal_loop_now_ns(all->loop);
     wake(all);
+    const uint64_t now = pal_loop_now_ns(all->loop); /* not before what wake has noted */
     for (viewer *v = all->place; v < all->place + all->n_place; v++) {
         if (!v->peer || v->peer->drop_code) continue;
         if (!v->joined && now - v->opened_ns > PAL_RELAY_JOIN_NS)
@@ -405,6 +413,7 @@ pal_err pal_relay_viewers_create(pal_loop *loop, pal_relay_kept *kept, const pal
     all->n_place = all->max_viewers + PAL_RELAY_UNJOINED;
     all->place = calloc((size_t)all->n_place, sizeof *all->place);
     if (!all->place) err = PAL_ERR_MEMORY;
+    if (!err) err = pal_relay_list_check(options->relays, "--relays", diag);
     if (!err && options->keys) err = pal_admission_create(options->keys, false, diag, &all->admission);
     if (err) return pal_relay_viewers_destroy(all), err;
     pal_loop_listen(loop, &(pal_loop_events){wake, tick, all});

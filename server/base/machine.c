@@ -71,3 +71,15 @@ double pal_machine_read_ms(double n_byte)
     /* the sums are used, so that the compiler keeps the loop */
     return sum[1] > 0 ? min / ((double)n * sizeof(float)) * n_byte : 0;
 }
+
+double pal_machine_resident_bytes(int process)
+{
+    char name[64], line[LINE];
+    double kb = 0;
+    snprintf(name, sizeof name, "/proc/%d/status", process);
+    FILE *file = fopen(name, "re");
+    while (file && fgets(line, sizeof line, file))
+        if (!strncmp(line, "VmRSS:", 6)) kb = atof(line + 6);
+    if (file) fclose(file);
+    return 1024 * kb;
+}

@@ -1,4 +1,5 @@
-/* The machine that figures were measured on: its processor and cores, and its memory bandwidth. Thread: any. */
+/* The machine that figures were measured on: its processor and cores, its memory bandwidth, and what processes hold.
+ * Thread: any. */
 #ifndef PAL_BASE_MACHINE_H
 #define PAL_BASE_MACHINE_H
 enum { PAL_MACHINE_TEXT = 128 };
@@ -10,4 +11,6 @@ const char *pal_machine_name(char text[PAL_MACHINE_TEXT]);
  * are read faster; below 64 KiB and above 32 MiB the rate at those sizes is used. 0: no memory for the measurement.
  * Takes some ms and heap memory */
 double pal_machine_read_ms(double n_byte);
+/* bytes of memory that a process has in use; 0 without /proc */
+double pal_machine_resident_bytes(int process);
 #endif

@@ -3,6 +3,7 @@
  * pulls the organ by its top to and fro; the others have nobody inside and sleep. Of the touched ones: the 99th
  * percentile of the processor time of a step, frames that the member has taken a second, and the slowdown of the
  * slowest session, real over simulated time. Memory is what the process has grown by, over the number of sessions. */
+#include "server/base/machine.h"
 #include "server/bench/bench.h"
 #include "server/num/median.h"
 #include "server/scene/scene_file.h"
@@ -14,6 +15,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 /* processor time of a step of a body that sleeps, at most */
 enum { ASLEEP_NS = 100000 };
@@ -30,18 +32,6 @@ typedef struct member {
     double slowdown;
     int n_frame;
 } member;
-
-/* VmRSS in bytes; 0 without /proc */
-static double resident_bytes(void)
-{
-    char line[256];
-    double kb = 0;
-    FILE *file = fopen("/proc/self/status", "r");
-    while (file && fgets(line, sizeof line, file))
-        if (!strncmp(line, "VmRSS:", 6)) kb = atof(line + 6);
-    if (file) fclose(file);
-    return 1024 * kb;
-}
 
 /* the first of the cores that this process may use; false: they are not known */
 static bool keep_to_one_core(cpu_set_t *before)
@@ -114,7 +104,7 @@ static pal_err run_case(const bench_case *c, const pal_loaded_scene *loaded, dou
     static member m[SESSIONS_MAX];
     const int n = c->n_touched + c->n_asleep;
     malloc_trim(0);
-    const double before = resident_bytes();
+    const double before = pal_machine_resident_bytes(getpid());
     const pal_session_options options = {.lease_s = 5, .only_observed = true};
     const pal_prepared *mesh = loaded->scene.body[0].mesh;
     pal_err err = PAL_ERR_OK;
@@ -133,7 +123,7 @@ static pal_err run_case(const bench_case *c, const pal_loaded_scene *loaded, dou
         pal_clock_sleep_until_ns(start + (uint64_t)(1e9 * time_s));
         for (int k = 0; k < c->n_touched; k++) play(&m[k], turn, time_s, ms, &n_ms);
     }
-    const double bytes = resident_bytes() - before;
+    const double bytes = pal_machine_resident_bytes(getpid()) - before;
     for (int k = 0; k < n; k++) pal_session_close(m[k].session);
     if (!err) report(c, m, ms, n_ms, mesh->tets.n_node, bytes, r);
     return err;

@@ -35,6 +35,8 @@ const pal_flag pal_config_keys[PAL_CONFIG_KEYS] = {
      "most error of streamed positions, m (1/3000 of the box, at most 0.00005)"},
     {"max_clients", "N", PAL_FLAG_COUNT, NULL, 1, 10000, "members at once, who may hold tools or give orders (200)"},
     {"max_viewers", "N", PAL_FLAG_COUNT, NULL, 1, 10000, "viewers at once, counted apart from members (1000)"},
+    {"relays", "URL,...", PAL_FLAG_TEXT, NULL, 0, 0,
+     "relays to which pages go that only watch and find no place here (none)"},
     {"threads", "N", PAL_FLAG_COUNT, NULL, 1, 64, "threads that share a step, where the scene does not say (1)"},
     {"lcm", "URL", PAL_FLAG_TEXT, NULL, 0, 0, "also speak LCM there, in a process of its own (off)"},
     {"lcm_key", "FILE", PAL_FLAG_TEXT, NULL, 0, 0,
@@ -49,13 +51,14 @@ const pal_flag pal_config_keys[PAL_CONFIG_KEYS] = {
 };
 /* where a key is stored, in the order of the keys */
 static const size_t place[PAL_CONFIG_KEYS] = {
-    offsetof(pal_config, listen),      offsetof(pal_config, port),        offsetof(pal_config, allow_remote),
-    offsetof(pal_config, hosts),       offsetof(pal_config, tls_cert),    offsetof(pal_config, tls_key),
-    offsetof(pal_config, health),      offsetof(pal_config, open),        offsetof(pal_config, keys),
-    offsetof(pal_config, viewer),      offsetof(pal_config, error_m),     offsetof(pal_config, max_clients),
-    offsetof(pal_config, max_viewers), offsetof(pal_config, threads),     offsetof(pal_config, lcm),
-    offsetof(pal_config, lcm_key),     offsetof(pal_config, lcm_channel), offsetof(pal_config, log),
-    offsetof(pal_config, record),      offsetof(pal_config, drain_to),    offsetof(pal_config, agones),
+    offsetof(pal_config, listen),      offsetof(pal_config, port),     offsetof(pal_config, allow_remote),
+    offsetof(pal_config, hosts),       offsetof(pal_config, tls_cert), offsetof(pal_config, tls_key),
+    offsetof(pal_config, health),      offsetof(pal_config, open),     offsetof(pal_config, keys),
+    offsetof(pal_config, viewer),      offsetof(pal_config, error_m),  offsetof(pal_config, max_clients),
+    offsetof(pal_config, max_viewers), offsetof(pal_config, relays),   offsetof(pal_config, threads),
+    offsetof(pal_config, lcm),         offsetof(pal_config, lcm_key),  offsetof(pal_config, lcm_channel),
+    offsetof(pal_config, log),         offsetof(pal_config, record),   offsetof(pal_config, drain_to),
+    offsetof(pal_config, agones),
 };
 
 void pal_config_default(pal_config *config)

@@ -9,7 +9,7 @@
 #include "server/base/flags.h"
 #include "server/base/log.h"
 
-enum { PAL_CONFIG_TEXT = 256, PAL_CONFIG_KEYS = 21 };
+enum { PAL_CONFIG_TEXT = 256, PAL_CONFIG_KEYS = 22 };
 
 typedef struct pal_config {
     char listen[PAL_CONFIG_TEXT]; /* "127.0.0.1"                                                         */
@@ -24,6 +24,7 @@ typedef struct pal_config {
     double error_m;                    /* bound of streamed positions; 0: 1/3000 of the box, at most 0.05 mm  */
     int max_clients;                   /* 200                                                                 */
     int max_viewers;                   /* 1000                                                                */
+    char relays[PAL_CONFIG_TEXT];      /* "http://a:8092/,...": where who watches finds a place; "": none       */
     int threads;                       /* of a session whose scene gives none; 1                              */
     char lcm[PAL_CONFIG_TEXT];         /* LCM URL: start palpate-lcm with it; "": no LCM                      */
     char lcm_key[PAL_CONFIG_TEXT];     /* key file of that bus; "": none */

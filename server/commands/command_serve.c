@@ -176,6 +176,7 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
                                   .error_m = run->config.error_m,
                                   .max_clients = run->config.max_clients,
                                   .max_viewers = run->config.max_viewers,
+                                  .relays = run->config.relays,
                                   .resume = run->resume,
                                   .study = run->study,
                                   .recording = run->recording,

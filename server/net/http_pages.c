@@ -9,6 +9,7 @@
 #include "server/net/hub_sessions.h"
 #include "server/net/hub_watch.h"
 #include "server/net/transport/plain_text.h"
+#include "server/net/transport/relay_list.h"
 #include "server/net/tuning.h"
 
 #include <math.h>
@@ -145,6 +146,8 @@ static void get_sessions(pal_hub *hub, const pal_request *request, pal_reply *re
         if (knows(hub, request, name, PAL_WIRE_ROLE_VIEWER)) add_people(session, hub->room[r]);
         cJSON_AddItemToArray(sessions, session);
     }
+    cJSON *relays = pal_relay_list_json(hub->relays);
+    if (relays) cJSON_AddItemToObject(root, "relays", relays);
     const bool instructs = hub->sessions && knows(hub, request, "", PAL_WIRE_ROLE_INSTRUCTOR);
     pal_hub_sessions_openings(hub->sessions, add_opening, &(openings){sessions, instructs});
     if (instructs && hub->source) {

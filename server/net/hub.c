@@ -17,6 +17,7 @@
 #include "server/net/hub_verb.h"
 #include "server/net/hub_watch.h"
 #include "server/net/transport/plain_text.h"
+#include "server/net/transport/relay_list.h"
 #include "server/net/tuning.h"
 #include "server/session/resume.h"
 
@@ -388,12 +389,14 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
     hub->started_s = (uint32_t)time(NULL);
     hub->health_on_main = !options->allow_remote && !(options->health && options->health[0]);
     hub->max_members = options->max_clients > 0 ? options->max_clients : PAL_HUB_CLIENTS;
+    hub->relays = options->relays && options->relays[0] ? options->relays : NULL;
     hub->max_viewers = options->max_viewers > 0 ? options->max_viewers : PAL_HUB_VIEWERS;
-    hub->max_clients = hub->max_members + hub->max_viewers + PAL_UNJOINED_PLACES;
+    hub->max_clients = hub->max_members + hub->max_viewers + PAL_VIEWING_TICKETS + PAL_UNJOINED_PLACES;
     hub->client = calloc((size_t)hub->max_clients, sizeof *hub->client);
     hub->control = malloc(sizeof *hub->control);
     hub->text = malloc(PAL_CONTROL_OUT_MAX + 1);
     if (!hub->client || !hub->control || !hub->text) err = PAL_ERR_MEMORY;
+    if (!err) err = pal_relay_list_check(options->relays, "--relays", diag);
     if (!err) err = pal_admission_create(options->key_file, options->open, diag, &hub->admission);
     if (!err && n_session > PAL_SESSIONS_MAX)
         err = PAL_REFUSE(diag, "%d sessions, at most %d", n_session, PAL_SESSIONS_MAX);

@@ -23,6 +23,8 @@ typedef struct pal_server_options {
     const char *drain_to;         /* where members go when the server ends (pal_hub_drain), borrowed; NULL: nowhere */
     double error_m;               /* bound of streamed positions per axis; 0: 1/3000 of the box, at most 0.05 mm */
     int max_clients, max_viewers; /* members, and who only watches; 0: 200, 1000 */
+    const char *relays;           /* to which who watches is sent when there is no place (relay_list.h), borrowed until
+                                     close; NULL: none */
     struct pal_resume **resume;   /* of sessions that go on after a crash: their edits, taken [n_session]; NULL, or an
                                      entry of it: none */
     const pal_session_study *study;         /* [n_session], borrowed until close; NULL: none */

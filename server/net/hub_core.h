@@ -224,6 +224,7 @@ struct pal_hub {
     pal_site *site;
     pal_admission *admission;
     int n_room, n_numbered, n_client;
+    const char *relays;                        /* for who watches and finds no place (relay_list.h); NULL: none */
     int max_members, max_viewers, max_clients; /* max_clients: both, and those who have not joined yet */
     uint32_t n_viewed;                         /* viewers that have joined, in all */
     _Atomic uint64_t ended; /* bit i: session i of those that it was given was ended by an instructor */

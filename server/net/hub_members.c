@@ -132,10 +132,12 @@ static bool has_place(const pal_client *c, pal_wire_role role)
     }
     if (role == PAL_WIRE_ROLE_INSTRUCTOR) return n < hub->max_members;
     /* from this machine comes a proxy for everybody, and whoever is here can do worse than fill places */
-    const bool counted = !pal_address_is_loopback(c->grant.address) && !c->grant.ticket.uses && !c->grant.ticket.user;
+    const bool made_for = c->grant.ticket.uses || c->grant.ticket.user;
+    const bool counted = !pal_address_is_loopback(c->grant.address) && !made_for;
+    const int viewers = hub->max_viewers + (made_for ? PAL_VIEWING_TICKETS : 0);
     if (watches && of_address < hub->max_viewers / PAL_VIEWING_ADDRESSES)
         of_address = hub->max_viewers / PAL_VIEWING_ADDRESSES;
-    return n < (watches ? hub->max_viewers : hub->max_members - kept) && (!counted || n_address < of_address);
+    return n < (watches ? viewers : hub->max_members - kept) && (!counted || n_address < of_address);
 }
 
 /* an id that no other viewer of the room has */
@@ -176,7 +178,10 @@ static bool enter(pal_client *c, pal_wire_role role, const char *name)
     const uint64_t now = pal_loop_now_ns(c->hub->loop);
     const char *full = "the server has no free place";
     pal_err err = PAL_ERR_FULL;
-    if (has_place(c, role)) {
+    int code = PAL_WIRE_CLOSE_FULL;
+    if (!has_place(c, role)) {
+        if (role == PAL_WIRE_ROLE_VIEWER && c->hub->relays) code = PAL_WIRE_CLOSE_ELSEWHERE;
+    } else {
         full = "as many as this ticket admits are here, or have been";
         err = pal_admission_enter(c->hub->admission, &c->grant, now);
         if (!err) {
@@ -188,7 +193,7 @@ static bool enter(pal_client *c, pal_wire_role role, const char *name)
     if (!err) return true;
     c->id = 0;
     c->hub->count.n_refused_join++;
-    pal_hub_drop(c, PAL_WIRE_CLOSE_FULL, "%s", err == PAL_ERR_STATE ? "an instructor has locked the session" : full);
+    pal_hub_drop(c, code, "%s", err == PAL_ERR_STATE ? "an instructor has locked the session" : full);
     return false;
 }
 

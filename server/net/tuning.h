@@ -36,6 +36,9 @@
 /* viewers of one address of another machine: at least as many as members, else one of so many parts of all places. A
  * lecture hall comes by one address, and it takes some of them to keep others out (test_members_hub) */
 #define PAL_VIEWING_ADDRESSES 4
+/* viewers beyond all places whose ticket was made for them: a relay that comes back finds a place in a full server
+ * (test_members_hub) */
+#define PAL_VIEWING_TICKETS 16
 /* connections that have not joined yet, in all and from one address; a further one takes the place of the oldest. A
  * client joins within a round trip or two (test_hub) */
 #define PAL_UNJOINED_PLACES     64

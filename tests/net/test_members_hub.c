@@ -1,18 +1,26 @@
 /* Members of a server that nobody enters without a ticket: roles, rights that instructors give, tools that they hand
  * over, who is put out, and places. */
+#include "server/net/admission/ticket_keys.h"
+#include "server/net/transport/relay_list.h"
 #include "server/net/tuning.h"
 #include "tests/net/hub_scene.h"
 #include "tests/net/server_fixture.h"
 
+#include <unistd.h>
+
 static small_scene organ;
 static char ticket[PAL_WIRE_ROLE_COUNT][PAL_TICKET_TEXT];
 
-static void begin_with(int max_clients, int max_viewers)
+static void begin_server(pal_server_options options)
 {
     served_guarded = true;
-    served_begin(&organ.scene, (pal_session_options){.start_paused = true},
-                 (pal_server_options){.max_clients = max_clients, .max_viewers = max_viewers});
+    served_begin(&organ.scene, (pal_session_options){.start_paused = true}, options);
     for (int r = 0; r < PAL_WIRE_ROLE_COUNT; r++) pal_server_start_ticket(server, (pal_wire_role)r, ticket[r]);
+}
+
+static void begin_with(int max_clients, int max_viewers)
+{
+    begin_server((pal_server_options){.max_clients = max_clients, .max_viewers = max_viewers});
 }
 
 static void begin(int max_clients)
@@ -314,6 +322,72 @@ static void viewers_and_members_take_no_place_of_each_other(void)
     end();
 }
 
+/* who watches and finds no place is sent to the relays; who would take part is not, and nobody into a locked session */
+static void who_finds_no_place_to_watch_is_sent_to_relays(void)
+{
+    mem_client teacher, viewer[2], trainee[2];
+    begin_server((pal_server_options){
+        .max_clients = 2, .max_viewers = 1, .relays = "http://192.0.2.7:8092/,https://b.example/?session=small"});
+    CHECK(page_has("/sessions", "\"relays\":[\"http://192.0.2.7:8092/\",\"https://b.example/?session=small\"]"));
+    for (int i = 0; i < 2; i++) join(&viewer[i], "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    CHECK_INT(pal_mem_code(viewer[0].peer), 0);
+    CHECK_INT(pal_mem_code(viewer[1].peer), PAL_WIRE_CLOSE_ELSEWHERE);
+    CHECK_TEXT(pal_mem_reason(viewer[1].peer), "the server has no free place");
+    join(&teacher, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    for (int i = 0; i < 2; i++) join(&trainee[i], "Tim", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
+    CHECK_INT(pal_mem_code(trainee[1].peer), PAL_WIRE_CLOSE_FULL);
+    mem_end(&viewer[0]), mem_end(&viewer[1]);
+    order(&teacher, "lock_session", "", "\"enabled\":1");
+    turn(&teacher, NULL);
+    join(&viewer[0], "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    CHECK_INT(pal_mem_code(viewer[0].peer), PAL_WIRE_CLOSE_FULL);
+    mem_end(&viewer[0]), mem_end(&teacher), mem_end(&trainee[0]), mem_end(&trainee[1]);
+    end();
+}
+
+/* a relay is a viewer too: with a ticket of its own it comes back into a server that a crowd has filled meanwhile */
+static void a_ticket_of_ones_own_finds_a_place_to_watch(void)
+{
+    static char path[] = "/tmp/palpate_members_keys_XXXXXX";
+    static mem_client guest[PAL_VIEWING_TICKETS + 1];
+    mem_client crowd[2];
+    pal_ticket_keys keys;
+    char text[PAL_TICKET_TEXT];
+    int id = 0, fd = mkstemp(path);
+    REQUIRE(fd >= 0 && !close(fd) && !unlink(path) && !pal_key_file_add(path, &id, NULL));
+    REQUIRE(!pal_ticket_keys_read(path, &keys, NULL));
+    const pal_ticket ticket_of_relay = {.role = PAL_WIRE_ROLE_VIEWER, .user = 7, .nonce = 1};
+    CHECK(pal_ticket_put(&ticket_of_relay, &keys.key[0], text));
+    begin_server((pal_server_options){.max_viewers = 1, .key_file = path});
+    for (int i = 0; i < 2; i++) join(&crowd[i], "Eve", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    CHECK_INT(pal_mem_code(crowd[1].peer), PAL_WIRE_CLOSE_FULL);
+    for (int i = 0; i <= PAL_VIEWING_TICKETS; i++) {
+        mem_connect(&guest[i], transport, "192.0.2.7", text);
+        mem_enter(&guest[i], "relay", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE, false);
+        CHECK_INT(pal_mem_code(guest[i].peer), i < PAL_VIEWING_TICKETS ? 0 : PAL_WIRE_CLOSE_FULL);
+    }
+    for (int i = 0; i <= PAL_VIEWING_TICKETS; i++) mem_end(&guest[i]);
+    mem_end(&crowd[0]), mem_end(&crowd[1]);
+    end();
+    unlink(path);
+}
+
+static void what_is_no_address_of_a_relay_is_refused(void)
+{
+    static const char *const wrong[] = {"relay:8092",       "javascript:alert(1)", "http://a/,ftp://b/",
+                                        "http://",          "http:///x",           "http://a/<b>",
+                                        "http://a/#ticket", "http://a/,,http://b/"};
+    char many[512] = "";
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++)
+        CHECK_INT(pal_relay_list_check(wrong[i], "--relays", NULL), PAL_ERR_REFUSED);
+    CHECK_INT(pal_relay_list_check(NULL, "--relays", NULL), PAL_ERR_OK);
+    CHECK(pal_relay_list_json("") == NULL);
+    for (int i = 0; i < PAL_RELAY_LIST_MAX; i++) strcat(many, "http://a:1/,");
+    CHECK_INT(pal_relay_list_check(many, "--relays", NULL), PAL_ERR_OK); /* one comma at its end */
+    strcat(many, "http://a:1/");
+    CHECK_INT(pal_relay_list_check(many, "--relays", NULL), PAL_ERR_REFUSED);
+}
+
 /* more viewers than `members` names: everybody has an id and the list, and who may act is always on it */
 static void a_crowd_of_viewers_leaves_the_members_listed(void)
 {
@@ -409,6 +483,9 @@ int main(void)
     RUN(who_fills_places_keeps_nobody_out);
     RUN(places_are_kept_for_instructors);
     RUN(viewers_and_members_take_no_place_of_each_other);
+    RUN(who_finds_no_place_to_watch_is_sent_to_relays);
+    RUN(a_ticket_of_ones_own_finds_a_place_to_watch);
+    RUN(what_is_no_address_of_a_relay_is_refused);
     RUN(a_crowd_of_viewers_leaves_the_members_listed);
     RUN(viewers_of_one_address_keep_no_others_out);
     RUN(members_are_reported_four_times_a_second);

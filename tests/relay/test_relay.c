@@ -2,8 +2,13 @@
  * it came, as the link does, and viewers on the relay's own transport decode it. */
 #include "clients/relay/relay_viewers.h"
 #include "clients/relay/tuning.h"
+#include "server/net/admission/ticket_keys.h"
+#include "tests/net/adaptive_scene.h"
 #include "tests/net/hub_scene.h"
 #include "tests/net/server_fixture.h"
+
+#include <time.h>
+#include <unistd.h>
 
 static small_scene organ;
 static pal_relay_kept kept;
@@ -12,6 +17,15 @@ static pal_relay_viewers *viewers;
 static pal_transport *down;
 static pal_mem_peer *up;
 static bool asset_late; /* upstream's assets do not come yet */
+
+/* the clock of the relay moves between any two looks at it, as a real one does */
+static uint64_t moving_now(void *user)
+{
+    static uint64_t looks;
+    (void)user;
+    return manual_clock_now(&served_clock) + ++looks;
+}
+static const pal_clock moving_clock = {.now_ns = moving_now};
 
 static void no_news(void *user)
 {
@@ -59,20 +73,25 @@ static void pass(void)
     pal_loop_advance(loop);
 }
 
-static void begin(bool paused, pal_relay_options options)
+static void begin_with(const pal_scene *scene, bool paused, pal_relay_options options)
 {
     pal_peer_events events;
     pal_listen_address nowhere = {.ip = ""};
     pal_diagnostic diag = {""};
-    served_begin(&organ.scene, (pal_session_options){.start_paused = paused}, (pal_server_options){.max_viewers = 8});
+    served_begin(scene, (pal_session_options){.start_paused = paused}, (pal_server_options){.max_viewers = 8});
     pal_relay_kept_init(&kept, no_news, NULL);
     pal_relay_kept_fetch_by(&kept, fetch, NULL);
-    CHECK_INT(pal_loop_create(false, 0, false, &served_clock.clock, &diag, &loop), PAL_ERR_OK);
+    CHECK_INT(pal_loop_create(false, 0, false, &moving_clock, &diag, &loop), PAL_ERR_OK);
     CHECK_INT(pal_relay_viewers_create(loop, &kept, &options, &diag, &viewers), PAL_ERR_OK);
     pal_relay_viewers_events(viewers, &events);
     CHECK_INT(pal_mem_transport.open(loop, &nowhere, &events, &diag, &down), PAL_ERR_OK);
     connect_up();
     pass();
+}
+
+static void begin(bool paused, pal_relay_options options)
+{
+    begin_with(&organ.scene, paused, options);
 }
 
 static void end_relay(void)
@@ -224,6 +243,8 @@ static void nothing_that_a_viewer_says_goes_up(void)
     } message[] = {{"{\"type\":\"command\",\"verb\":\"pause\"}", "role"},
                    {"{\"type\":\"take_tool\",\"tool\":0}", "role"},
                    {"{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}", "field"},
+                   {"{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"none\",\"interior\":true}", "field"},
+                   {"{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"none\",\"energy\":true}", "field"},
                    {"{\"type\":\"join\",\"name\":\"again\",\"role\":\"viewer\",\"tool\":-1}", "joined"}};
     mem_client direct, v;
     const double at_m[3] = {0, 0, 0};
@@ -241,7 +262,7 @@ static void nothing_that_a_viewer_says_goes_up(void)
     }
     mem_pose(&v, 0, 1, at_m), mem_pose(&v, 0, 2, at_m);
     mem_pull(&v, 1000);
-    CHECK_INT(v.n_text[PAL_CONTROL_ERROR], 6);
+    CHECK_INT(v.n_text[PAL_CONTROL_ERROR], (int)(sizeof message / sizeof *message) + 2);
     mem_text(&v, "{\"type\":\"ping\",\"stamp_ms\":7}");
     mem_pull(&v, 1000);
     CHECK(v.last[PAL_CONTROL_PONG].stamp_ms == 7);
@@ -266,20 +287,101 @@ static void nothing_that_a_viewer_says_goes_up(void)
     end_relay();
 }
 
+/* a part that adapts comes with the triangles of its start, and whoever would take changes of them is told */
+static void changes_of_triangles_are_refused_in_words(void)
+{
+    static adaptive_scene storm;
+    mem_client changes, plain;
+    if (!adaptive_scene_make(&storm, ADAPTIVE_STORM)) CHECK_FAIL("no scene");
+    begin_with(&storm.scene, false, (pal_relay_options){.max_viewers = 4});
+    mem_join_as(&changes, down, "Ada", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE, true);
+    mem_join(&plain, down, "Bo", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    for (int i = 0; i < 30; i++) turn(FRAME_NS, NULL, &changes, &plain);
+    CHECK_INT(changes.n_text[PAL_CONTROL_ERROR], 1);
+    CHECK_TEXT(changes.last[PAL_CONTROL_ERROR].error.code, "topology");
+    CHECK_INT(plain.n_text[PAL_CONTROL_ERROR], 0);
+    CHECK(changes.n_frame > 5 && plain.n_frame > 5);
+    CHECK_INT(changes.n_patch + changes.n_bad + plain.n_bad, 0);
+    same_shape(&changes, &plain);
+    mem_end(&changes), mem_end(&plain);
+    end_relay();
+    adaptive_scene_free(&storm);
+}
+
+static pal_ticket_key ticket_key;
+
+/* a viewer of a new ticket, of this machine; the result is the code with which it was closed, 0: it has joined */
+static int enter_with(mem_client *c, pal_ticket ticket, const char *forged)
+{
+    static uint64_t nonce;
+    char text[PAL_TICKET_TEXT];
+    ticket.nonce = ++nonce;
+    CHECK(pal_ticket_put(&ticket, &ticket_key, text));
+    if (forged) text[PAL_TICKET_TEXT - 4] = text[PAL_TICKET_TEXT - 4] == *forged ? 'z' : *forged;
+    mem_connect(c, down, "", text);
+    if (!pal_mem_code(c->peer)) mem_enter(c, "guest", ticket.role, PAL_WIRE_TOOL_NONE, false);
+    if (!pal_mem_code(c->peer)) mem_pull(c, 1000);
+    return pal_mem_code(c->peer);
+}
+
+/* with keys a relay looks at tickets as a server does, and whatever role one is for, its bearer watches */
+static void tickets_are_checked_with_the_keys(void)
+{
+    static char path[] = "/tmp/palpate_relay_keys_XXXXXX";
+    mem_client none, other, guest[2];
+    pal_ticket_keys keys;
+    pal_diagnostic diag = {""};
+    int id = 0, fd = mkstemp(path);
+    if (fd < 0 || close(fd) || unlink(path) || pal_key_file_add(path, &id, &diag) ||
+        pal_ticket_keys_read(path, &keys, &diag))
+        CHECK_FAIL("no keys: %s", diag.text);
+    ticket_key = keys.key[0];
+    begin(true, (pal_relay_options){.max_viewers = 8, .keys = path});
+    mem_join(&none, down, "none", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    CHECK_INT(pal_mem_code(none.peer), 0); /* watching needs no ticket */
+
+    CHECK_INT(enter_with(&other, (pal_ticket){.role = PAL_WIRE_ROLE_VIEWER}, "A"), PAL_WIRE_CLOSE_POLICY);
+    CHECK_TEXT(pal_mem_reason(other.peer), "this ticket is not one of this server");
+    mem_end(&other);
+    const pal_ticket old = {.role = PAL_WIRE_ROLE_VIEWER, .expires_s = (uint32_t)time(NULL) - 10};
+    CHECK_INT(enter_with(&other, old, NULL), PAL_WIRE_CLOSE_POLICY);
+    mem_end(&other);
+    const pal_ticket elsewhere = {.role = PAL_WIRE_ROLE_VIEWER, .session = pal_ticket_session("liver")};
+    CHECK_INT(enter_with(&other, elsewhere, NULL), PAL_WIRE_CLOSE_POLICY);
+    mem_end(&other);
+
+    const pal_ticket here = {.role = PAL_WIRE_ROLE_INSTRUCTOR, .session = pal_ticket_session("small")};
+    CHECK_INT(enter_with(&other, here, NULL), 0);
+    CHECK_INT(other.last[PAL_CONTROL_HELLO].hello.you_role, PAL_WIRE_ROLE_VIEWER);
+    CHECK_TEXT(other.last[PAL_CONTROL_ERROR].error.code, "role");
+    /* a ticket for one admits one, until it leaves for good */
+    pal_ticket once = {.role = PAL_WIRE_ROLE_VIEWER, .uses = 1, .nonce = 77};
+    char text[PAL_TICKET_TEXT];
+    CHECK(pal_ticket_put(&once, &ticket_key, text));
+    for (int i = 0; i < 2; i++) {
+        mem_connect(&guest[i], down, "", text);
+        mem_enter(&guest[i], "guest", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE, false);
+        CHECK_INT(pal_mem_code(guest[i].peer), i ? PAL_WIRE_CLOSE_FULL : 0);
+    }
+    mem_end(&none), mem_end(&other), mem_end(&guest[0]), mem_end(&guest[1]);
+    end_relay();
+    unlink(path);
+}
+
 /* places, joining in time, and what is not there yet */
 static void places_are_limited_and_nobody_comes_before_the_session(void)
 {
     static mem_client silent[PAL_RELAY_UNJOINED + 1];
     mem_client a[3];
     asset_late = true;
-    begin(true, (pal_relay_options){.max_viewers = 2});
+    begin(true, (pal_relay_options){.max_viewers = 2, .relays = "http://192.0.2.7:8092/"});
     mem_connect(&a[0], down, "", "");
     CHECK_INT(pal_mem_code(a[0].peer), PAL_WIRE_CLOSE_GOING_AWAY); /* its assets are not here */
     mem_end(&a[0]);
     asset_late = false;
     pal_relay_want_missing(&kept);
     for (int i = 0; i < 3; i++) mem_join(&a[i], down, "v", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
-    for (int i = 0; i < 3; i++) CHECK_INT(pal_mem_code(a[i].peer), i < 2 ? 0 : PAL_WIRE_CLOSE_FULL);
+    for (int i = 0; i < 3; i++) CHECK_INT(pal_mem_code(a[i].peer), i < 2 ? 0 : PAL_WIRE_CLOSE_ELSEWHERE);
     mem_end(&a[2]);
     for (int i = 0; i <= PAL_RELAY_UNJOINED; i++) {
         char address[24];
@@ -425,6 +527,8 @@ int main(void)
     RUN(a_viewer_that_reads_nothing_is_closed);
     RUN(one_address_keeps_no_others_out);
     RUN(nothing_that_a_viewer_says_goes_up);
+    RUN(changes_of_triangles_are_refused_in_words);
+    RUN(tickets_are_checked_with_the_keys);
     RUN(places_are_limited_and_nobody_comes_before_the_session);
     RUN(viewers_outlive_a_lost_line_but_not_the_run);
     RUN(what_upstream_offers_and_nothing_names_is_refused);

@@ -96,6 +96,18 @@ wait $again
 check "a viewer outlives a server that comes back" $? == 0
 stop $server_job
 
+# tickets of a key file that server and relay share
+"$bin/palpate" ticket --new-key --keys "$work/keys" --quiet || exit 1
+ticket=$("$bin/palpate" ticket --keys "$work/keys" --role viewer --expires 0 --uses 0)
+start_server --port 0 --keys "$work/keys"
+start_relay keyed "$url" --keys "$work/keys"
+client admitted "$relay#$ticket" --script idle --tool none --until frames=1
+check "a ticket of the same keys is good at a relay" $code == 0
+timeout 60 "$bin/palpate-client" "$relay#${ticket%?????}AAAAA" --json --script idle --tool none --seconds 60 >"$work/forged" 2>"$work/forged.err"
+check "a forged one is refused for good" "$(grep -c 'not one of this server' "$work/forged" "$work/forged.err" | grep -c ':[1-9]')" ">" 0
+stop $relay_job
+stop $server_job
+
 # an edit at the server: the viewer gets the new parts, assets and frames
 make_block
 start_server --port 0

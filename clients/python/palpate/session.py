@@ -32,7 +32,7 @@ from .wire import Haptic, Pose, Tool, Tools, given, read_haptic, read_tools, wri
 _REPEAT_S = 0.05  # period of the repeated pose of a resting tool: the server releases one that is silent for 0.25 s
 _PAUSE_FIRST_S, _PAUSE_MAX_S = 0.25, 5.0  # before joining again; each is twice the one before
 # closures after which a client joins again (protocol/README.md, "Closing"); 0, 1005, 1006: without a code
-_MAY_RETURN = frozenset((0, 1000, 1001, 1005, 1006, 1011, 4002, 4003))
+_MAY_RETURN = frozenset((0, 1000, 1001, 1005, 1006, 1011, 4002, 4003, 4006))
 # orders that end with an `answer`; the others are done, or refused, before the `pong` of a ping behind them
 _ANSWERED = frozenset(
     "seek branch study_point configure delete divide extrude merge bridge sharpen paint set_rest_shape cut uncut "

@@ -28,6 +28,7 @@ const SPARE_MAX = 4; // pairs of arrays that wait for reuse
 const MOVE_MS = 60000; // so long a server that a session moves to is asked for it: it may be loading the scene
 const CLOSE_FULL = 4003; // for now: tried again
 const CLOSE_NO_SESSION = 4004; // or it has ended
+const CLOSE_ELSEWHERE = 4006; // no place here, but relays have
 const CLOSE_UNREADABLE = 4900; // close code: the server sent what this page cannot read
 
 /** close codes after which reconnection is useless, with the text for the user */
@@ -61,7 +62,9 @@ const FINAL = new Map([
  *   | import("./interior_link.js").InteriorMesh | import("./interior_link.js").InteriorValues
  *   | {type: "tools", time: number, tools: import("./wire.js").Tool[]}
  *   | {type: "silence", seconds: number}
- *   | {type: "figures", figures: LinkFigures}} PageMessage silence: of the server, whole seconds; 0: it answers again
+ *   | {type: "elsewhere"}
+ *   | {type: "figures", figures: LinkFigures}} PageMessage silence: of the server, whole seconds; 0: it answers again;
+ *   elsewhere: there is no place here, but relays have
  */
 /**
  * Messages from the page to the worker.
@@ -224,13 +227,14 @@ export class Link {
                 return;
             }
             const pause = Math.min(RETRY_MAX_MS, RETRY_MS * 2 ** this.tries++);
-            const full = event.code === CLOSE_FULL;
+            const full = event.code === CLOSE_FULL || event.code === CLOSE_ELSEWHERE;
             this.report(
                 "lost",
                 full
                     ? textOf("link.full", { reason: event.reason || textOf("link.session_full") })
                     : textOf(moves ? "link.moves" : "link.lost"),
             );
+            if (event.code === CLOSE_ELSEWHERE) this.env.post({ type: "elsewhere" });
             const next = this.generation;
             this.env.later(() => next === this.generation && this.dial(), pause);
         };

@@ -25,6 +25,7 @@ import { PlanPanel } from "./plan_panel.js";
 import { PlaybackBar } from "./playback_bar.js";
 import { Plots } from "./plots.js";
 import { PoseSender } from "./pose_sender.js";
+import { RelayChoice } from "./relays.js";
 import { showScale } from "./scale_bar.js";
 import { SculptHighlight } from "./sculpt_highlight.js";
 import { SculptPanel } from "./sculpt_panel.js";
@@ -112,7 +113,19 @@ const tools = { accuracy, plots, sculpt, highlight, inside, viewMenu };
 const controls = new Controls({ state, stage, layout, input, fields, ...tools, send, showFigures });
 const panels = { panel, members, accuracy, plots, sculpt, highlight, playback, others, controls };
 const messages = new Messages({ state, stage, layout, bodies, fields, inside, input, marks, send, move, ...panels });
-worker.onmessage = (/** @type {MessageEvent<import("./link.js").PageMessage>} */ { data }) => messages.take(data);
+const relays = new RelayChoice({
+    get: fetch.bind(window),
+    place: location,
+    ticket,
+    random: Math.random,
+    later: setTimeout,
+    go: (address) => location.replace(address),
+});
+worker.onmessage = (/** @type {MessageEvent<import("./link.js").PageMessage>} */ { data }) => {
+    if (data.type === "elsewhere") return void relays.refused();
+    if (data.type === "state" && data.state === "live") relays.admitted();
+    messages.take(data);
+};
 
 /** @returns {Stage} */
 function makeStage() {

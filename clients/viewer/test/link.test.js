@@ -349,6 +349,16 @@ test("a full session is tried again, and the page says so", () => {
     /** @type {any} */ (s.sockets[0]).onclose({ code: 4003, reason: "the session has no free place" });
     assert.equal(s.waiting.length, 1);
     assert.match(s.of("state").at(-1).text, /no free place, trying again/);
+    assert.equal(s.of("elsewhere").length, 0);
+});
+
+test("where relays have places the page is told, and tries again all the same", () => {
+    const s = stand();
+    s.link.connect({ url: "ws://host:1/ws", name: "Eve", role: "viewer", ticket: "" });
+    /** @type {any} */ (s.sockets[0]).onclose({ code: 4006, reason: "the server has no free place" });
+    assert.equal(s.of("elsewhere").length, 1);
+    assert.match(s.of("state").at(-1).text, /no free place, trying again/);
+    assert.equal(s.waiting.length, 1);
 });
 
 test("a message that cannot be read closes the connection, an old connection is not heard", async () => {
