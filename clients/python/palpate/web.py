@@ -37,11 +37,12 @@ def address_of(url: str, ticket: str | None) -> tuple[str, str]:
 
 
 def get(url: str, path: str, n_byte: int, timeout: float) -> bytes:
-    """At most n_byte bytes of a file of the server of this websocket address."""
-    address = urllib.parse.urljoin("http" + url[2:], path)
-    if urllib.parse.urlsplit(address).netloc != urllib.parse.urlsplit(url).netloc:
+    """At most n_byte bytes of a file of the server of this websocket address, with its ?session= for proxies."""
+    address = urllib.parse.urlsplit(urllib.parse.urljoin("http" + url[2:], path))
+    if address.netloc != urllib.parse.urlsplit(url).netloc:
         raise PalpateError("an asset is said to be on another server")
-    with _OPENER.open(address, timeout=timeout) as answer:
+    whole = address._replace(query=urllib.parse.urlsplit(url).query).geturl()
+    with _OPENER.open(whole, timeout=timeout) as answer:
         data: bytes = answer.read(n_byte)
     return data
 
