@@ -142,6 +142,7 @@ if [ -z "$fast" ]; then
     step "error against cost in the browser" sh "$tree/tests/browser/run.sh" accuracy "$build"
     step "viewer, trainee and instructor in the browser" sh "$tree/tests/browser/run.sh" rights "$build"
     step "sessions opened and ended in the browser" sh "$tree/tests/browser/run.sh" lobby "$build"
+    step "from a full server to a relay in the browser" sh "$tree/tests/browser/run.sh" relays "$build"
     step "time plots in the browser" sh "$tree/tests/browser/run.sh" plots "$build"
     step "endoscope, saved views, two views, stereo and a headset" sh "$tree/tests/browser/run.sh" views "$build"
     step "a recording in the browser" sh "$tree/tests/browser/run.sh" debrief "$build"

@@ -11,6 +11,7 @@
 #   rights    viewer, trainee and instructor by ticket, and what the instructor lets the others do
 #   debrief   a recording that is played, sought, and gone on from live
 #   lobby     sessions of a server, opened and ended by an instructor
+#   relays    a page that a full server refuses goes on to a relay
 #   access    keyboard, screen readers, other languages, telephones
 #   plots     force, displacement, work and step time over time; pictures and videos of the page
 #   look      a look for each organ, patterns that stick to tissue, shadows and occlusion

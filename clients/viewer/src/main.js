@@ -118,7 +118,7 @@ const relays = new RelayChoice({
     place: location,
     ticket,
     random: Math.random,
-    later: setTimeout,
+    later: (call, ms) => setTimeout(call, ms),
     go: (address) => location.replace(address),
 });
 worker.onmessage = (/** @type {MessageEvent<import("./link.js").PageMessage>} */ { data }) => {
