@@ -113,7 +113,7 @@ if [ -z "$fast" ]; then
     rm -f "$build"/built_* "$build"/fuzz_*.code
     # all rooms but those excluded below; for the thread sanitizer the rooms with threads
     rooms=$(cd "$tree/tests" && ls -d */CMakeLists.txt | sed 's,/.*,,' | grep -vE '^(accuracy|bench)$')
-    threads="base num estimate session net clients"
+    threads="base num estimate session net agones relay clients"
     # browsers and waiting tests leave much of the machine idle
     idle="nice -n 10"
     trap 'kill 0' INT # of what runs beside, too
