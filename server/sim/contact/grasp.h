@@ -24,6 +24,7 @@ typedef struct pal_grasp_transfer {
 typedef struct pal_grasp_implicit {
     bool pulls, constant;  /* in this sub-step; the load is a constant force                   */
     bool found;            /* the compliance was updated in this sub-step                      */
+    bool capped;           /* caps let the spring stretch less than it would                   */
     double total_N[3];     /* on the tool, counted in its force                                */
     double k_N_m, pull[3]; /* at the sub-step's begin: stiffness, force of the spring on tissue */
     double load[3];        /* force on tissue in body->load                                    */

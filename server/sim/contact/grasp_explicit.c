@@ -44,9 +44,8 @@ void pal_grasp_act_explicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *to
     pal_add3(tool->force_N, tool->force_N, g->force);
     tool->holding = true;
     if (step->sub != step->n_sub - 1) return;
-    if (!step->body->frozen)
+    if (!step->body->frozen && tool->haptic)
         pal_grasp_compliance_update(&g->compliance, body, body->compliance, g->node, g->weight, g->n_node, tool->here_m,
-                                    SHALLOW_RADII * tool->radius_m, tool->haptic ? FOLLOW_S : NO_HAPTICS_FOLLOW_S,
-                                    step->dt_s * step->n_sub, step->scratch);
+                                    SHALLOW_RADII * tool->radius_m, FOLLOW_S, step->dt_s * step->n_sub, step->scratch);
     pal_grasp_publish(g, tool, k, c);
 }

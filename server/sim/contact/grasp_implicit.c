@@ -21,7 +21,8 @@ void pal_grasp_act_implicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *to
     if (body->load_cap_N > 0) cap = fmin(cap, body->load_cap_N / pal_grasp_max_weight(g));
     double kept = fmin(implicit->stretch_m, (1 - FORCE_SHARE) * cap / k);
     double lead = pal_grasp_compliance_along(&g->compliance, k, fmin(k, g->fit.k_N_m), goal);
-    double max_m = kept + fmin(rise, ((1 - FORCE_SHARE) * cap - k * kept) / lead);
+    const double by_cap_m = ((1 - FORCE_SHARE) * cap - k * kept) / lead, max_m = kept + fmin(rise, by_cap_m);
+    implicit->capped = by_cap_m < rise && stretch > max_m;
     if (stretch > max_m) pal_scale3(goal, max_m / stretch, goal);
     implicit->pulls = pal_finite3(goal);
     implicit->constant = implicit->found = false;
@@ -98,7 +99,8 @@ bool pal_grasp_settle(void *self, pal_step *step, const double *moved, bool last
         const bool transferred = g->transfer && g->transfer->left_s > 0;
         int n_find = implicit->found ? 0 : transferred && g->compliance.n_known < 3 ? 3 : 1;
         implicit->found = true;
-        for (int k = 0; k < n_find; k++)
+        /* else nobody asks for it */
+        for (int k = 0; k < n_find && (tool->haptic || implicit->capped); k++)
             pal_grasp_compliance_update(&g->compliance, step->body, step->body->compliance, g->node, g->weight,
                                         g->n_node, tool->here_m, SHALLOW_RADII * tool->radius_m,
                                         tool->haptic ? FOLLOW_S : NO_HAPTICS_FOLLOW_S, step->dt_s * step->n_sub,

@@ -103,7 +103,8 @@ static void find_stiffness(pal_push *push, pal_tool_contact *t, const pal_tool *
     t->stiffness.time_s = step->time_s, t->stiffness.follow_s = tool->haptic ? FOLLOW_S : NO_HAPTICS_FOLLOW_S;
     const bool due = pal_haptic_stiffness_find(&t->stiffness, group, here, SHALLOW_RADII * radius);
     if (push->n_stiffness >= STIFFNESS_BUDGET || (group->force_N > 0 && implicit && implicit->solve.constant)) return;
-    if (!tool->haptic && (!due || group->force_N <= 0)) return;
+    /* caps alone ask for that of a contact then */
+    if (!tool->haptic && (!due || !implicit || !(implicit->solve.capped || implicit->back_m > 0))) return;
     if (!due) {
         double k = implicit ? implicit->solve.friction_N_m : 0;
         for (int i = 0; i < t->n_contact && !implicit; i++)

@@ -210,12 +210,13 @@ static void friction_drags_and_slides(void)
 
 /* a tower of 400 kPa, soft as a whole, is led 30 mm aside in half a second: the spring of a grasp, 16 E reach, reaches
  * its cap at a tenth of a millimetre, but the tower bears next to nothing of it and comes along */
-static void leads_what_is_stiff_but_bends(void)
+static void leads_what_is_stiff_but_bends(bool no_haptics)
 {
     fem_scene f;
     REQUIRE(fem_slab(&f, 3, 3, 16, 0.01, 1, 0.01, 15));
     f.s.scene->body[0].material.young_Pa = 4e5;
     REQUIRE(tool_scene_open(&f.s));
+    f.s.no_haptics = no_haptics;
     int top = 0;
     const pal_body *b = f.s.body;
     for (int i = 0; i < b->n_node; i++)
@@ -247,6 +248,16 @@ static void leads_what_is_stiff_but_bends(void)
     fem_close(&f);
 }
 
+static void leads_with_a_haptic_device(void)
+{
+    leads_what_is_stiff_but_bends(false);
+}
+
+static void leads_with_a_mouse(void)
+{
+    leads_what_is_stiff_but_bends(true);
+}
+
 int main(void)
 {
     RUN(rests_where_the_static_answer_is);
@@ -254,7 +265,8 @@ int main(void)
     RUN(pulls_what_it_grasps_and_rests);
     RUN(two_tools_share_a_place);
     RUN_LONG(keeps_to_its_cap);
-    RUN(leads_what_is_stiff_but_bends);
+    RUN(leads_with_a_haptic_device);
+    RUN(leads_with_a_mouse);
     RUN_LONG(friction_drags_and_slides);
     return check_report();
 }
