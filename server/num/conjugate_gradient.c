@@ -77,15 +77,15 @@ int pal_conjugate_gradient_run(pal_conjugate_gradient *cg, double *x, double tar
     const int n = cg->n;
     double rr = product(cg->team, n, cg->r, cg->r), rz_old = 0;
     pass p = {.n = n, .cg = cg, .x = x};
-    int done = 0;
-    while (done < max && rr > 0 && (done < min || rr > target * target)) {
+    cg->n_done = 0;
+    while (cg->n_done < max && rr > 0 && (cg->n_done < min || rr > target * target)) {
         cg->precondition(cg->user, cg->r, cg->z);
         double rz = product(cg->team, n, cg->r, cg->z);
-        if (!(rz > 0) || !isfinite(rz) || (done >= min && rz <= cg->gain * cg->energy)) break;
+        if (!(rz > 0) || !isfinite(rz) || (cg->n_done >= min && rz <= cg->gain * cg->energy)) break;
         /* z'(r - r of before) / (z'r of before), and r of before is r + alpha q */
-        p.beta = done > 0 ? -p.alpha * product(cg->team, n, cg->z, cg->q) / rz_old : 0;
+        p.beta = cg->n_done > 0 ? -p.alpha * product(cg->team, n, cg->z, cg->q) / rz_old : 0;
         p.what = DIRECTION;
-        if (done == 0)
+        if (cg->n_done == 0)
             memcpy(cg->p, cg->z, sizeof(double) * (size_t)n);
         else
             (void)run_pass(&p, cg->team);
@@ -97,8 +97,8 @@ int pal_conjugate_gradient_run(pal_conjugate_gradient *cg, double *x, double tar
         cg->energy += p.alpha * rz;
         p.what = ADVANCE;
         rr = run_pass(&p, cg->team);
-        done++;
+        cg->n_done++;
     }
     cg->residual = sqrt(rr);
-    return done;
+    return cg->n_done;
 }

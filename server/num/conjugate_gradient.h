@@ -1,6 +1,6 @@
 /* Preconditioned conjugate gradients for symmetric positive definite systems (Hestenes & Stiefel 1952), with the
- * preconditioner given as a function. beta is Polak and Ribiere's, so that a preconditioner which is not quite the same
- * from call to call (single precision) does no harm. No heap. Thread: any, one per struct. */
+ * preconditioner given as a function. beta is Polak and Ribiere's, so that a preconditioner which is not the same from
+ * call to call (single precision, another cycle of multigrid) does no harm. No heap. Thread: any, one per struct. */
 #ifndef PAL_NUM_CONJUGATE_GRADIENT_H
 #define PAL_NUM_CONJUGATE_GRADIENT_H
 #include "server/base/team.h"
@@ -18,6 +18,7 @@ typedef struct pal_conjugate_gradient {
      */
     double gain, energy;
     double residual; /* out: |r|, Euclidean                                     */
+    int n_done;      /* out: iterations so far, while it runs too               */
 } pal_conjugate_gradient;
 
 /* Improves x until |r| <= target, with at least `min` (unless r = 0) and at most `max` iterations; stops where a number

@@ -7,7 +7,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-const float pal_chebyshev_weight[PAL_CHEBYSHEV_DEGREE] = {1.00842544782028f, 1.08867839208730f, 1.33753125909618f};
+const pal_chebyshev *pal_cycle_smoother(pal_cycle cycle)
+{
+    static const pal_chebyshev before_and_after = {3, {1.00842544782028f, 1.08867839208730f, 1.33753125909618f}},
+                               after = {5,
+                                        {1.00212930146164f, 1.02173711549260f, 1.07872433192603f, 1.19810065292663f,
+                                         1.41322542791682f}};
+    return cycle == PAL_CYCLE_V ? &before_and_after : &after;
+}
 
 /* rows of a piece of work of a thread: some five microseconds */
 enum { ROWS = 96 };
@@ -255,12 +262,13 @@ static inline vec4 multiply_row(const matrix *a, int i, const vec4 *x)
 typedef struct pass {
     matrix *a;
     enum { FROM_ZERO, FROM_X, STEP, RESIDUAL, RESTRICT, PROLONG } what;
+    bool zero; /* x is 0, whatever it holds: residual, prolong */
     float keep, take, weight, late;
     const pal_grid_level *grid; /* of the coarser of two levels, restrict and prolong */
     const vec4 *other;          /* what the other level has */
 } pass;
 
-/* b = P' other of a coarse node; x += P other of a finer one */
+/* b = P' other of a coarse node; x += P other of a finer one, or x = P other */
 static void transfer_row(const pass *p, int i)
 {
     const pal_grid_level *grid = p->grid;
@@ -268,6 +276,7 @@ static void transfer_row(const pass *p, int i)
     const int32_t *start = down ? grid->begin : grid->start, *list = down ? grid->finer : grid->from;
     vec4 sum = {0};
     for (int32_t k = start[i]; k < start[i + 1]; k++) sum += p->other[list[k]];
+    if (!down && p->zero) p->a->x[i] = (vec4){0};
     if (down)
         p->a->b[i] = sum;
     else if (start[i] < start[i + 1])
@@ -278,7 +287,7 @@ static void smooth_row(const pass *p, int i)
 {
     matrix *a = p->a;
     const vec4 b = p->what == STEP ? a->r[i] : a->b[i];
-    a->r[i] = p->what == FROM_ZERO ? b : b - multiply_row(a, i, p->what == STEP ? a->d : a->x);
+    a->r[i] = p->what == FROM_ZERO || p->zero ? b : b - multiply_row(a, i, p->what == STEP ? a->d : a->x);
     if (p->what == RESIDUAL) return;
     a->e[i] = p->take * a->inverse[i] * a->r[i];
     if (p->what == STEP) a->e[i] += p->keep * a->d[i];
@@ -311,20 +320,19 @@ static void run_pass(pass *p, pal_team *team)
 }
 
 /* x = the smoother's answer, from 0 or from x */
-static void smooth(matrix *a, pal_team *team, bool from_zero)
+static void smooth(matrix *a, pal_team *team, const pal_chebyshev *smoother, bool from_zero)
 {
-    run_pass(&(pass){.a = a,
-                     .what = from_zero ? FROM_ZERO : FROM_X,
-                     .take = 4 / (3 * a->lambda),
-                     .weight = pal_chebyshev_weight[0]},
-             team);
-    for (int k = 1; k < PAL_CHEBYSHEV_DEGREE; k++)
+    run_pass(
+        &(pass){
+            .a = a, .what = from_zero ? FROM_ZERO : FROM_X, .take = 4 / (3 * a->lambda), .weight = smoother->weight[0]},
+        team);
+    for (int k = 1; k < smoother->degree; k++)
         run_pass(&(pass){.a = a,
                          .what = STEP,
                          .keep = pal_chebyshev_keep(k),
                          .take = pal_chebyshev_take(k) / a->lambda,
-                         .weight = pal_chebyshev_weight[k],
-                         .late = k == 1 && !from_zero ? pal_chebyshev_weight[0] : 0},
+                         .weight = smoother->weight[k],
+                         .late = k == 1 && !from_zero ? smoother->weight[0] : 0},
                  team);
 }
 
@@ -386,31 +394,33 @@ static void solve_coarsest(pal_multigrid *mg, matrix *a)
     for (int i = 0; i < a->n; i++) a->x[i] = (vec4){(float)v[3 * i], (float)v[3 * i + 1], (float)v[3 * i + 2], 0};
 }
 
-static void cycle(pal_multigrid *mg, pal_team *team, int k)
+static void solve_level(pal_multigrid *mg, pal_cycle cycle, pal_team *team, int k)
 {
     matrix *a = &mg->level[k];
+    const pal_chebyshev *smoother = pal_cycle_smoother(cycle);
+    const bool zero = cycle == PAL_CYCLE_SAWTOOTH;
     if (k == mg->n_level - 1) {
         solve_coarsest(mg, a);
         return;
     }
     const pal_grid_level *grid = &mg->grid->level[k + 1];
     matrix *coarse = &mg->level[k + 1];
-    smooth(a, team, true);
-    run_pass(&(pass){.a = a, .what = RESIDUAL, .grid = grid}, team);
+    if (!zero) smooth(a, team, smoother, true);
+    run_pass(&(pass){.a = a, .what = RESIDUAL, .zero = zero, .grid = grid}, team);
     run_pass(&(pass){.a = coarse, .what = RESTRICT, .grid = grid, .other = a->r}, team);
-    cycle(mg, team, k + 1);
-    run_pass(&(pass){.a = a, .what = PROLONG, .grid = grid, .other = coarse->x}, team);
-    smooth(a, team, false);
+    solve_level(mg, cycle, team, k + 1);
+    run_pass(&(pass){.a = a, .what = PROLONG, .zero = zero, .grid = grid, .other = coarse->x}, team);
+    smooth(a, team, smoother, false);
 }
 
-const float *pal_multigrid_cycle(pal_multigrid *mg, const float *residual, pal_team *team)
+const float *pal_multigrid_solve(pal_multigrid *mg, pal_cycle cycle, const float *residual, pal_team *team)
 {
     run_pass(&(pass){.a = &mg->level[0],
                      .what = RESTRICT,
                      .grid = &mg->grid->level[0],
                      .other = (const vec4 *)(const void *)residual},
              team);
-    cycle(mg, team, 0);
+    solve_level(mg, cycle, team, 0);
     return (const float *)mg->level[0].x;
 }
 

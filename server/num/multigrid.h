@@ -1,12 +1,12 @@
 /* Geometric multigrid on levels of cells, as a preconditioner in single precision: Galerkin matrices of 3x3 blocks on
- * every level, Chebyshev smoothing, one V-cycle, and a Cholesky factor of the coarsest level.
+ * every level, Chebyshev smoothing, one cycle, and a Cholesky factor of the coarsest level.
  *
  * A coarse cell is a connected group of the cells in a block of 2 x 2 x 2 (composite elements: Dick, Georgii,
  * Westermann 2011), so that parts that a cut separates stay apart on every level. The finest level, on which the caller
  * smooths without a matrix, is not kept here; its interpolation from the first level is level[0].start and from. The
- * smoother is the optimised Chebyshev iteration of the fourth kind of degree 3 on D^-1 A (Lottes 2022; Phillips and
- * Fischer 2022), D a third of the trace of each diagonal block. Memory: heap, freed by destroy; no heap call in a
- * cycle. Thread: [load] to make, then one thread at a time. */
+ * smoother is the optimised Chebyshev iteration of the fourth kind on D^-1 A (Lottes 2022; Phillips and Fischer 2022),
+ * D a third of the trace of each diagonal block. Memory: heap, freed by destroy; no heap call in a cycle. Thread:
+ * [load] to make, then one thread at a time. */
 #ifndef PAL_NUM_MULTIGRID_H
 #define PAL_NUM_MULTIGRID_H
 #include "server/base/team.h"
@@ -14,10 +14,19 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Chebyshev iteration of degree 3: weights of the directions (Phillips and Fischer 2022), and the factor that keeps an
- * estimated largest eigenvalue on the safe side */
-enum { PAL_CHEBYSHEV_DEGREE = 3 };
-extern const float pal_chebyshev_weight[PAL_CHEBYSHEV_DEGREE];
+/* What a cycle does on each level besides the coarser ones' correction. V: the smoother of degree 3 before and after
+ * it; symmetric. SAWTOOTH (Wesseling 1992): the smoother of degree 5 after it alone. That is a product with A fewer,
+ * and takes more of the error in the first iterations of conjugate gradients. As it is not symmetric, many of them may
+ * stagnate */
+typedef enum pal_cycle { PAL_CYCLE_V, PAL_CYCLE_SAWTOOTH } pal_cycle;
+
+/* Chebyshev iteration: weights of the directions (Phillips and Fischer 2022) */
+typedef struct pal_chebyshev {
+    int degree;
+    float weight[5]; /* [degree] */
+} pal_chebyshev;
+const pal_chebyshev *pal_cycle_smoother(pal_cycle cycle); /* [any] */
+/* the factor that keeps an estimated largest eigenvalue on the safe side */
 #define PAL_CHEBYSHEV_SAFE 1.1
 /* products of the power iteration that estimates it to a few per cent (tests/sim/implicit/test_preconditioner.c) */
 enum { PAL_POWER_ITERATIONS = 15 };
@@ -75,8 +84,8 @@ pal_err pal_multigrid_finish(pal_multigrid *mg);
 
 /* answer ~ A^-1 P' residual on the first level; residual: of the finest nodes, each over the number of nodes that it is
  * interpolated from, x y z 0 [n_finest][4]; answer: x y z 0 of the first level's nodes [n_node][4], until the next
- * cycle. team: NULL, or threads that share the work; the same bits with any number */
-const float *pal_multigrid_cycle(pal_multigrid *mg, const float *residual, pal_team *team);
+ * solve. team: NULL, or threads that share the work; the same bits with any number */
+const float *pal_multigrid_solve(pal_multigrid *mg, pal_cycle cycle, const float *residual, pal_team *team);
 
 /* k [24][24], a matrix of a finer cell in corners and axes, interpolated from the corners of the cell that contains it
  * at `octant` and added to `to`; corners whose bits are set in `fixed` do not move */

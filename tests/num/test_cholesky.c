@@ -599,8 +599,14 @@ static int iterations(const grid *g, const pal_incomplete_cholesky *f, const dou
     const size_t n = 3 * (size_t)g->n;
     for (size_t i = 0; i < n; i++) r[i] = g->fixed[i / 3] ? 0 : b[i], size += r[i] * r[i], x[i] = 0;
     gradients of = {g, f};
-    pal_conjugate_gradient cg = {(int)n,   multiply,     precondition, &of, NULL, r,
-                                 room + n, room + 2 * n, room + 3 * n, 0,   0,    -1};
+    pal_conjugate_gradient cg = {.n = (int)n,
+                                 .multiply = multiply,
+                                 .precondition = precondition,
+                                 .user = &of,
+                                 .r = r,
+                                 .z = room + n,
+                                 .p = room + 2 * n,
+                                 .q = room + 3 * n};
     const int turns = pal_conjugate_gradient_run(&cg, x, 1e-8 * sqrt(size), 1, 5000);
     free(room);
     return turns;

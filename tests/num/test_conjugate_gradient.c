@@ -43,7 +43,8 @@ static int solve(chain *c, double target, int min, int max, double *error, doubl
     double w[N], x[N] = {0}, r[N], z[N], p[N], q[N];
     for (int i = 0; i < N; i++) w[i] = 1 + i % 5;
     multiply(c, w, r);
-    pal_conjugate_gradient cg = {N, multiply, precondition, c, NULL, r, z, p, q, 0, 0, -1};
+    pal_conjugate_gradient cg = {
+        .n = N, .multiply = multiply, .precondition = precondition, .user = c, .r = r, .z = z, .p = p, .q = q};
     int n = pal_conjugate_gradient_run(&cg, x, target, min, max);
     *error = 0;
     for (int i = 0; i < N; i++) *error = fmax(*error, fabs(x[i] - w[i]));
@@ -108,7 +109,8 @@ static void stops_where_there_is_no_way_down(void)
     CHECK_INT(solve(&c, 1e-9, 0, 50, &error, &residual), 0);
     CHECK_NEAR(error, 5, 0); /* x is as it was */
     double zero[N] = {0}, x[N] = {0}, z[N], p[N], q[N];
-    pal_conjugate_gradient cg = {N, multiply, precondition, &c, NULL, zero, z, p, q, 0, 0, -1};
+    pal_conjugate_gradient cg = {
+        .n = N, .multiply = multiply, .precondition = precondition, .user = &c, .r = zero, .z = z, .p = p, .q = q};
     CHECK_INT(pal_conjugate_gradient_run(&cg, x, 0, 5, 50), 0);
     CHECK_NEAR(cg.residual, 0, 0);
 }
@@ -122,7 +124,15 @@ static void ends_once_the_energy_is_known(void)
     for (int i = 0; i < N; i++) w[i] = 1 + i % 5;
     multiply(&c, w, b);
     const double wanted = pal_dot_product(N, w, b);
-    pal_conjugate_gradient cg = {N, multiply, precondition, &c, NULL, r, z, p, q, 1e-3, 0, -1};
+    pal_conjugate_gradient cg = {.n = N,
+                                 .multiply = multiply,
+                                 .precondition = precondition,
+                                 .user = &c,
+                                 .r = r,
+                                 .z = z,
+                                 .p = p,
+                                 .q = q,
+                                 .gain = 1e-3};
     memcpy(r, b, sizeof r);
     const int n = pal_conjugate_gradient_run(&cg, x, 0, 1, 50);
     CHECK_NEAR(cg.energy, pal_dot_product(N, x, b), 1e-9 * wanted);

@@ -17,7 +17,8 @@ static void multiply(void *user, const double *p, double *out)
 
 static void precondition(void *user, const double *r, double *z)
 {
-    pal_preconditioner_solve(&((pal_compliance_solver *)user)->preconditioner, r, z);
+    pal_compliance_solver *solver = user;
+    pal_preconditioner_solve(&solver->preconditioner, pal_preconditioner_cycle(solver->cg.n_done), r, z);
 }
 
 /* the earlier answer to the force most like r; the one unused for longest when none is; *share: how much of it fits */

@@ -158,21 +158,21 @@ static void run_pass(pass *p)
 }
 
 /* x = the smoother's answer, from 0 or from x, with q = weight x before and after */
-static void smooth(const pal_hex_multigrid *mg, bool from_zero)
+static void smooth(const pal_hex_multigrid *mg, const pal_chebyshev *smoother, bool from_zero)
 {
     if (!from_zero) multiply(mg, mg->levels->x);
     run_pass(&(pass){.mg = mg,
                      .what = from_zero ? FROM_ZERO : FROM_X,
                      .take = 4 / (3 * mg->now.lambda),
-                     .weight = pal_chebyshev_weight[0]});
-    for (int k = 1; k < PAL_CHEBYSHEV_DEGREE; k++) {
+                     .weight = smoother->weight[0]});
+    for (int k = 1; k < smoother->degree; k++) {
         multiply(mg, mg->levels->d);
         run_pass(&(pass){.mg = mg,
                          .what = STEP,
-                         .last = k == PAL_CHEBYSHEV_DEGREE - 1,
+                         .last = k == smoother->degree - 1,
                          .keep = pal_chebyshev_keep(k),
                          .take = pal_chebyshev_take(k) / mg->now.lambda,
-                         .weight = pal_chebyshev_weight[k]});
+                         .weight = smoother->weight[k]});
     }
 }
 
@@ -192,6 +192,7 @@ typedef struct transfer {
     const double *in;
     double *out, scale;
     const float *coarse; /* answer of the first coarser level */
+    bool zero;           /* x is 0, whatever it and q hold    */
     enum { TAKE, RESTRICT, PROLONG, GIVE } what;
 } transfer;
 
@@ -202,7 +203,8 @@ static void restrict_node(const transfer *t, int i, size_t at)
     const size_t n = (size_t)mg->levels->n_slot;
     const float part = 1 / (float)(mg->levels->grid.level[0].start[i + 1] - mg->levels->grid.level[0].start[i]);
     float v[3], *to = mg->levels->part + 4 * i;
-    for (size_t c = 0; c < 3; c++) v[c] = part * (mg->levels->b[at + c * n] - mg->levels->q[at + c * n]);
+    for (size_t c = 0; c < 3; c++)
+        v[c] = part * (t->zero ? mg->levels->b[at + c * n] : mg->levels->b[at + c * n] - mg->levels->q[at + c * n]);
     if (t->warp->rotated)
         turn(t->warp->w + 9 * i, v, true, to);
     else
@@ -245,6 +247,8 @@ static void transfer_nodes(void *user, int worker, int index)
             mg->levels->b[at + c * n] = (float)(t->scale * t->in[3 * i + (int)c]);
         for (size_t c = 0; c < 3 && t->what == GIVE; c++)
             t->out[3 * i + (int)c] = t->scale * (double)mg->levels->x[at + c * n];
+        for (size_t c = 0; c < 3 && t->what == PROLONG && t->zero; c++)
+            mg->levels->x[at + c * n] = mg->levels->q[at + c * n] = 0;
         if (t->what == RESTRICT && !held) restrict_node(t, i, at);
         if (t->what == PROLONG && !held) prolong_node(t, i, at);
     }
@@ -266,19 +270,22 @@ static void correct_stiff(pal_hex_multigrid *mg, const pal_warp *warp)
     weigh(mg, levels->x);
 }
 
-/* the coarse levels' part: x += W P A1^-1 P' W' (b - A x) */
-static void correct(pal_hex_multigrid *mg, const pal_warp *warp)
+/* the coarse levels' part: x += W P A1^-1 P' W' (b - A x), of a sawtooth x = W P A1^-1 P' W' b */
+static void correct(pal_hex_multigrid *mg, pal_cycle cycle, const pal_warp *warp)
 {
-    transfer t = {.mg = mg, .warp = warp, .what = RESTRICT};
-    multiply(mg, mg->levels->x);
+    transfer t = {.mg = mg, .warp = warp, .what = RESTRICT, .zero = cycle == PAL_CYCLE_SAWTOOTH};
+    if (!t.zero) multiply(mg, mg->levels->x);
     run_transfer(&t);
-    t.coarse = pal_multigrid_cycle(mg->now.coarse, mg->levels->part, mg->levels->body->team);
+    t.coarse = pal_multigrid_solve(mg->now.coarse, cycle, mg->levels->part, mg->levels->body->team);
     t.what = PROLONG;
     run_transfer(&t);
 }
 
-void pal_hex_multigrid_solve(pal_hex_multigrid *mg, const pal_warp *warp, const double *r, double *z)
+void pal_hex_multigrid_solve(pal_hex_multigrid *mg, pal_cycle cycle, const pal_warp *warp, const double *r, double *z)
 {
+    /* stiff nodes are to be corrected before the coarse levels and after them */
+    if (mg->now.stiff_nodes.n > 0) cycle = PAL_CYCLE_V;
+    const pal_chebyshev *smoother = pal_cycle_smoother(cycle);
     double largest = 0;
     for (int i = 0; i < 3 * mg->levels->body->n_node; i++) largest = fabs(r[i]) > largest ? fabs(r[i]) : largest;
     if (!(largest > 0) || !isfinite(largest)) {
@@ -287,11 +294,11 @@ void pal_hex_multigrid_solve(pal_hex_multigrid *mg, const pal_warp *warp, const 
     }
     const unsigned mode = pal_subnormals_flush();
     run_transfer(&(transfer){.mg = mg, .warp = warp, .in = r, .scale = 1 / largest, .what = TAKE});
-    smooth(mg, true);
+    if (cycle == PAL_CYCLE_V) smooth(mg, smoother, true);
     correct_stiff(mg, warp);
-    correct(mg, warp);
+    correct(mg, cycle, warp);
     correct_stiff(mg, warp);
-    smooth(mg, false);
+    smooth(mg, smoother, false);
     run_transfer(&(transfer){.mg = mg, .warp = warp, .out = z, .scale = largest, .what = GIVE});
     pal_subnormals_restore(mode);
 }

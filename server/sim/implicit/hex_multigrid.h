@@ -60,5 +60,5 @@ void pal_hex_multigrid_rotate(pal_hex_multigrid *mg); /* takes the rotations of 
 /* largest of diagonal of A over mass_kg, at the last update */
 double pal_hex_multigrid_stiffest(const pal_hex_multigrid *mg);
 /* z ~ A^-1 r [n_dof][3], z may be r; warp: since the last update */
-void pal_hex_multigrid_solve(pal_hex_multigrid *mg, const pal_warp *warp, const double *r, double *z);
+void pal_hex_multigrid_solve(pal_hex_multigrid *mg, pal_cycle cycle, const pal_warp *warp, const double *r, double *z);
 #endif

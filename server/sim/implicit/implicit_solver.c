@@ -48,7 +48,8 @@ static void multiply(void *user, const double *p, double *out)
 
 static void precondition(void *user, const double *r, double *z)
 {
-    pal_preconditioner_solve(&((pal_implicit *)user)->preconditioner, r, z);
+    pal_implicit *core = user;
+    pal_preconditioner_solve(&core->preconditioner, pal_preconditioner_cycle(core->cg.n_done), r, z);
 }
 
 static pal_err make_arrays(pal_implicit *core, pal_arena *arena)

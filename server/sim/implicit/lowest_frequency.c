@@ -52,7 +52,7 @@ static void precondition(void *user, const double *r, double *out)
 {
     search *s = user;
     if (s->coarsens)
-        pal_preconditioner_solve(&s->multigrid, r, out);
+        pal_preconditioner_solve(&s->multigrid, PAL_CYCLE_V, r, out);
     else
         pal_rest_preconditioner_solve(s->incomplete, r, out);
 }

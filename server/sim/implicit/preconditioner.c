@@ -250,10 +250,10 @@ static void solve_unturned(pal_preconditioner *p, const double *r, double *z)
     }
 }
 
-void pal_preconditioner_solve(pal_preconditioner *p, const double *r, double *z)
+void pal_preconditioner_solve(pal_preconditioner *p, pal_cycle cycle, const double *r, double *z)
 {
     if (p->kind == PAL_PRECONDITION_MULTIGRID) {
-        pal_hex_multigrid_solve(&p->multigrid, &p->warp, r, z);
+        pal_hex_multigrid_solve(&p->multigrid, cycle, &p->warp, r, z);
         return;
     }
     if (!p->warp.rotated) {

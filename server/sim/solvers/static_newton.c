@@ -127,7 +127,8 @@ static void multiply_true(void *user, const double *p, double *out)
 
 static void precondition(void *user, const double *r, double *z)
 {
-    pal_preconditioner_solve(&((static_newton *)user)->preconditioner, r, z);
+    static_newton *solver = user;
+    pal_preconditioner_solve(&solver->preconditioner, pal_preconditioner_cycle(solver->cg.n_done), r, z);
 }
 
 static pal_err make_arrays(static_newton *solver, pal_arena *arena)
@@ -397,7 +398,7 @@ static pal_err solve_linear(static_newton *solver, double size)
     pal_preconditioner_rotate(&solver->preconditioner);
     double before = pal_clock_s();
     if (direct)
-        pal_preconditioner_solve(&solver->preconditioner, solver->cg.r, solver->move);
+        pal_preconditioner_solve(&solver->preconditioner, PAL_CYCLE_V, solver->cg.r, solver->move);
     else
         run_gradients(solver, size);
     if (solver->relieved) {
