@@ -18,7 +18,8 @@ static void multiply(void *user, const double *p, double *out)
 static void precondition(void *user, const double *r, double *z)
 {
     pal_compliance_solver *solver = user;
-    pal_preconditioner_solve(&solver->preconditioner, pal_preconditioner_cycle(solver->cg.n_done), r, z);
+    const pal_cycle cycle = pal_preconditioner_cycle(solver->system, solver->cg.n_done);
+    pal_preconditioner_solve(&solver->preconditioner, cycle, r, z);
 }
 
 /* the earlier answer to the force most like r; the one unused for longest when none is; *share: how much of it fits */

@@ -185,79 +185,101 @@ static void turn(const float *w, const float *v, bool back, float *to)
     }
 }
 
-/* the way between nodes and slots, for a piece of the nodes */
+/* the way between nodes and slots */
 typedef struct transfer {
-    pal_hex_multigrid *mg;
+    void (*piece)(const struct transfer *t, int first, int end); /* of the nodes */
+    const pal_hex_multigrid *mg;
     const pal_warp *warp;
     const double *in;
     double *out, scale;
     const float *coarse; /* answer of the first coarser level */
     bool zero;           /* x is 0, whatever it and q hold    */
-    enum { TAKE, RESTRICT, PROLONG, GIVE } what;
 } transfer;
 
-/* part [n_node][4] = what the residual b - A x at the node is to each node that it is interpolated from */
-static void restrict_node(const transfer *t, int i, size_t at)
+/* b = scale in */
+static void take_nodes(const transfer *t, int first, int end)
 {
-    const pal_hex_multigrid *mg = t->mg;
-    const size_t n = (size_t)mg->levels->n_slot;
-    const float part = 1 / (float)(mg->levels->grid.level[0].start[i + 1] - mg->levels->grid.level[0].start[i]);
-    float v[3], *to = mg->levels->part + 4 * i;
-    for (size_t c = 0; c < 3; c++)
-        v[c] = part * (t->zero ? mg->levels->b[at + c * n] : mg->levels->b[at + c * n] - mg->levels->q[at + c * n]);
-    if (t->warp->rotated)
-        turn(t->warp->w + 9 * i, v, true, to);
-    else
-        memcpy(to, v, sizeof v);
+    const int32_t *slot = t->mg->levels->body->node_order->slot;
+    const size_t n = (size_t)t->mg->levels->n_slot;
+    float *restrict b = t->mg->levels->b;
+    for (int i = first; i < end; i++) {
+        const double *in = t->in + 3 * i;
+        float *at = b + slot[i];
+        at[0] = (float)(t->scale * in[0]), at[n] = (float)(t->scale * in[1]), at[2 * n] = (float)(t->scale * in[2]);
+    }
+}
+
+/* out = scale x */
+static void give_nodes(const transfer *t, int first, int end)
+{
+    const int32_t *slot = t->mg->levels->body->node_order->slot;
+    const size_t n = (size_t)t->mg->levels->n_slot;
+    const float *x = t->mg->levels->x;
+    for (int i = first; i < end; i++) {
+        const float *at = x + slot[i];
+        double *restrict out = t->out + 3 * i;
+        out[0] = t->scale * (double)at[0], out[1] = t->scale * (double)at[n], out[2] = t->scale * (double)at[2 * n];
+    }
+}
+
+/* part [n_node][4] = what the residual b - A x at the node is to each node that it is interpolated from */
+static void restrict_nodes(const transfer *t, int first, int end)
+{
+    const pal_hex_levels *levels = t->mg->levels;
+    const int32_t *slot = levels->body->node_order->slot, *start = levels->grid.level[0].start;
+    const size_t n = (size_t)levels->n_slot;
+    const float *b = levels->b, *q = levels->q;
+    for (int i = first; i < end; i++) {
+        if (start[i] == start[i + 1]) continue;
+        const float share = 1 / (float)(start[i + 1] - start[i]);
+        float v[3], *restrict to = levels->part + 4 * i;
+        for (size_t c = 0, at = (size_t)slot[i]; c < 3; c++, at += n) v[c] = share * (t->zero ? b[at] : b[at] - q[at]);
+        if (t->warp->rotated)
+            turn(t->warp->w + 9 * i, v, true, to);
+        else
+            memcpy(to, v, sizeof v);
+    }
 }
 
 /* x += the mean of the coarse answer, turned; q = weight x */
-static void prolong_node(const transfer *t, int i, size_t at)
+static void prolong_nodes(const transfer *t, int first, int end)
 {
-    const pal_hex_multigrid *mg = t->mg;
-    const pal_grid_level *grid = &mg->levels->grid.level[0];
-    const size_t n = (size_t)mg->levels->n_slot;
-    const float *x = t->coarse;
-    float v[3] = {0, 0, 0}, turned[3];
-    for (int k = grid->start[i]; k < grid->start[i + 1]; k++)
-        for (int c = 0; c < 3; c++) v[c] += x[4 * grid->from[k] + c];
-    if (t->warp->rotated)
-        turn(t->warp->w + 9 * i, v, false, turned);
-    else
-        memcpy(turned, v, sizeof v);
-    for (size_t c = 0; c < 3; c++) {
-        mg->levels->x[at + c * n] += turned[c] / (float)(grid->start[i + 1] - grid->start[i]);
-        mg->levels->q[at + c * n] = mg->now.weight[at] * mg->levels->x[at + c * n];
+    const pal_hex_levels *levels = t->mg->levels;
+    const pal_grid_level *grid = &levels->grid.level[0];
+    const int32_t *slot = levels->body->node_order->slot, *start = grid->start;
+    const size_t n = (size_t)levels->n_slot;
+    float *restrict x = levels->x, *restrict q = levels->q;
+    for (int i = first; i < end; i++) {
+        const int n_from = start[i + 1] - start[i];
+        const float weight = t->mg->now.weight[slot[i]];
+        float v[3] = {0, 0, 0}, turned[3] = {0, 0, 0};
+        if (n_from == 0 && !t->zero) continue;
+        for (int k = start[i]; k < start[i + 1]; k++)
+            for (int c = 0; c < 3; c++) v[c] += t->coarse[4 * grid->from[k] + c];
+        if (t->warp->rotated)
+            turn(t->warp->w + 9 * i, v, false, turned);
+        else
+            memcpy(turned, v, sizeof v);
+        for (size_t c = 0, at = (size_t)slot[i]; c < 3; c++, at += n) {
+            const float move = n_from > 0 ? turned[c] / (float)n_from : 0;
+            x[at] = t->zero ? move : x[at] + move;
+            q[at] = weight * x[at];
+        }
     }
 }
 
-static void transfer_nodes(void *user, int worker, int index)
+static void transfer_piece(void *user, int worker, int index)
 {
     const transfer *t = user;
-    const pal_hex_multigrid *mg = t->mg;
-    const int32_t *slot = mg->levels->body->node_order->slot, *start = mg->levels->grid.level[0].start;
-    const size_t n = (size_t)mg->levels->n_slot;
-    const int first = index * NODES,
-              end = first + NODES < mg->levels->body->n_node ? first + NODES : mg->levels->body->n_node;
+    const int n_node = t->mg->levels->body->n_node, first = index * NODES;
     (void)worker;
-    for (int i = first; i < end; i++) {
-        const size_t at = (size_t)slot[i];
-        const bool held = start[i] == start[i + 1];
-        for (size_t c = 0; c < 3 && t->what == TAKE; c++)
-            mg->levels->b[at + c * n] = (float)(t->scale * t->in[3 * i + (int)c]);
-        for (size_t c = 0; c < 3 && t->what == GIVE; c++)
-            t->out[3 * i + (int)c] = t->scale * (double)mg->levels->x[at + c * n];
-        for (size_t c = 0; c < 3 && t->what == PROLONG && t->zero; c++)
-            mg->levels->x[at + c * n] = mg->levels->q[at + c * n] = 0;
-        if (t->what == RESTRICT && !held) restrict_node(t, i, at);
-        if (t->what == PROLONG && !held) prolong_node(t, i, at);
-    }
+    t->piece(t, first, first + NODES < n_node ? first + NODES : n_node);
 }
 
 static void run_transfer(transfer *t)
 {
     const pal_body *body = t->mg->levels->body;
-    pal_team_run(body->team, (body->n_node + NODES - 1) / NODES, transfer_nodes, t);
+    pal_team_run(body->team, (body->n_node + NODES - 1) / NODES, transfer_piece, t);
 }
 
 /* x += W S' (S A S')^-1 S W' (b - A x) */
@@ -273,11 +295,11 @@ static void correct_stiff(pal_hex_multigrid *mg, const pal_warp *warp)
 /* the coarse levels' part: x += W P A1^-1 P' W' (b - A x), of a sawtooth x = W P A1^-1 P' W' b */
 static void correct(pal_hex_multigrid *mg, pal_cycle cycle, const pal_warp *warp)
 {
-    transfer t = {.mg = mg, .warp = warp, .what = RESTRICT, .zero = cycle == PAL_CYCLE_SAWTOOTH};
+    transfer t = {.piece = restrict_nodes, .mg = mg, .warp = warp, .zero = cycle == PAL_CYCLE_SAWTOOTH};
     if (!t.zero) multiply(mg, mg->levels->x);
     run_transfer(&t);
     t.coarse = pal_multigrid_solve(mg->now.coarse, cycle, mg->levels->part, mg->levels->body->team);
-    t.what = PROLONG;
+    t.piece = prolong_nodes;
     run_transfer(&t);
 }
 
@@ -293,13 +315,13 @@ void pal_hex_multigrid_solve(pal_hex_multigrid *mg, pal_cycle cycle, const pal_w
         return;
     }
     const unsigned mode = pal_subnormals_flush();
-    run_transfer(&(transfer){.mg = mg, .warp = warp, .in = r, .scale = 1 / largest, .what = TAKE});
+    run_transfer(&(transfer){.piece = take_nodes, .mg = mg, .in = r, .scale = 1 / largest});
     if (cycle == PAL_CYCLE_V) smooth(mg, smoother, true);
     correct_stiff(mg, warp);
     correct(mg, cycle, warp);
     correct_stiff(mg, warp);
     smooth(mg, smoother, false);
-    run_transfer(&(transfer){.mg = mg, .warp = warp, .out = z, .scale = largest, .what = GIVE});
+    run_transfer(&(transfer){.piece = give_nodes, .mg = mg, .out = z, .scale = largest});
     pal_subnormals_restore(mode);
 }
 

@@ -49,7 +49,8 @@ static void multiply(void *user, const double *p, double *out)
 static void precondition(void *user, const double *r, double *z)
 {
     pal_implicit *core = user;
-    pal_preconditioner_solve(&core->preconditioner, pal_preconditioner_cycle(core->cg.n_done), r, z);
+    const pal_cycle cycle = pal_preconditioner_cycle(&core->system, core->cg.n_done);
+    pal_preconditioner_solve(&core->preconditioner, cycle, r, z);
 }
 
 static pal_err make_arrays(pal_implicit *core, pal_arena *arena)

@@ -128,7 +128,8 @@ static void multiply_true(void *user, const double *p, double *out)
 static void precondition(void *user, const double *r, double *z)
 {
     static_newton *solver = user;
-    pal_preconditioner_solve(&solver->preconditioner, pal_preconditioner_cycle(solver->cg.n_done), r, z);
+    const pal_cycle cycle = pal_preconditioner_cycle(&solver->system, solver->cg.n_done);
+    pal_preconditioner_solve(&solver->preconditioner, cycle, r, z);
 }
 
 static pal_err make_arrays(static_newton *solver, pal_arena *arena)
