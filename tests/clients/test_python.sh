@@ -22,7 +22,7 @@ else
 fi
 asks packets "$tree/tests/data/golden"
 check "golden packets and bad bytes" $? == 0
-if "$python" -c 'import pip, setuptools, wheel' 2>/dev/null; then
+if "$python" -c 'import setuptools, wheel, pip' 2>/dev/null; then
     cp -r "$tree/clients/python" "$work/source" # setuptools leaves files there
     "$python" -m venv --system-site-packages --without-pip "$work/venv"
     (
