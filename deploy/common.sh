@@ -76,3 +76,10 @@ fetch_viewer() {
     cp "$from/package.json" "$from/package-lock.json" "$to/" || return 1
     (cd "$to" && npm ci --no-audit --no-fund --loglevel=error --fetch-retries=2 --fetch-timeout=60000) >"$build/npm.log" 2>&1
 }
+
+# Prometheus for the test of the dashboard, unpacked into the build folder: Debian's package starts a service when it is installed
+fetch_prometheus() {
+    ! command -v prometheus >/dev/null 2>&1 && [ ! -x "$build/prometheus/usr/bin/prometheus" ] || return 0
+    message "downloading prometheus"
+    (cd "$build" && apt-get download -q prometheus && dpkg -x prometheus_*.deb prometheus && rm prometheus_*.deb) >"$build/prometheus.log" 2>&1
+}

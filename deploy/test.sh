@@ -19,6 +19,7 @@ esac
 install_missing run test pack || exit 1
 install_missing scan || message "tests of the scan are skipped: it is not available"
 install_missing mpi || message "calibration over MPI is not built and its test is skipped"
+fetch_prometheus || message "the test of the dashboard is skipped: could not download prometheus, see $build/prometheus.log"
 fetch_viewer || fail "could not download the packages of the viewer, see $build/npm.log"
 
 passed=0 failed=0 skipped=0

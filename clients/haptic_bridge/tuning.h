@@ -9,7 +9,7 @@
  * Without it the tank spends what the motors' lag has given already (test_bridge_rendering: 0.14 mJ a pass) */
 #define MOTOR_TIME_S 1e-3
 
-/* ---- states (test_servo) ---- */
+/* ---- states (test_servo, test_servo_models) ---- */
 
 /* s. A model older than max(this, 4 frame times, twice the usual longest gap), at most STALE_MAX_S, is stale */
 #define STALE_MIN_S 0.1

@@ -2,7 +2,7 @@
 // Opens a scene on a game server of the fleet: prints its address and a ticket. The Kubernetes API is reached through
 // `kubectl proxy`; the ticket is made by palpate, so the key file is that of the fleet. The session's name is put into the
 // map of HAProxy (deploy/haproxy.cfg), so that ?session=NAME leads to its server. A name that has been in use goes on with
-// its recording: this is how a session is opened again after its server has ended.
+// its recording: this is how a session is opened again after its server has ended, and what --keep does by itself.
 import { execFileSync } from "node:child_process";
 import { randomBytes } from "node:crypto";
 import { readFileSync } from "node:fs";
@@ -20,7 +20,12 @@ const usage = `usage: allocate.mjs SCENE [flags]
   --role ROLE        of the ticket that is printed (trainee)
   --site URL         where browsers find the gateway (http://ADDRESS:PORT of the server)
   --admin SOCKET     of HAProxy, and --map FILE as its configuration names it (no map)
-Prints one JSON object: address, session, ticket, server.`;
+  --keep             stay, and open the session on another server whenever its own has ended and somebody was in it;
+                     ends with the session
+Prints one JSON object for each server: address, session, ticket, server.`;
+const LOOK_MS = 500; // between two looks at the session
+const EMPTY_LOOKS = 4; // a server that ends has dropped its members up to a second before
+const ANSWER_MS = 5000; // for a look
 const text = (value) => ({ type: "string", default: value });
 const { values: flag, positionals } = parseArgs({
     allowPositionals: true,
@@ -35,6 +40,7 @@ const { values: flag, positionals } = parseArgs({
         site: text(""),
         admin: text(""),
         map: text(""),
+        keep: { type: "boolean", default: false },
     },
 });
 if (positionals.length !== 1 || !flag.keys || !flag.admin !== !flag.map) {
@@ -71,16 +77,23 @@ async function allocate() {
     return { name: status.gameServerName, at: `${status.address}:${status.ports[0].port}` };
 }
 
+const wait = (ms) => new Promise((done) => setTimeout(done, ms));
+
+/** what the server lists of the session @param {string} at @param {RequestInit} request */
+async function find(at, request) {
+    const { sessions } = await (await fetch(`http://${at}/sessions`, request)).json();
+    return sessions.find((one) => one.name === session);
+}
+
 /** the session runs when the server lists it; its opening takes as long as the scene and its recording take to load */
 async function open(at) {
     const headers = { Authorization: `Bearer ${makeTicket("instructor", 300)}` };
     await post(`http://${at}/sessions`, { open: scene, name: session }, headers);
     for (;;) {
-        const { sessions } = await (await fetch(`http://${at}/sessions`, { headers })).json();
-        const own = sessions.find((one) => one.name === session);
+        const own = await find(at, { headers });
         if (!own || own.state === "failed") throw new Error(`${scene} cannot be opened: ${own?.text ?? "it is gone"}`);
         if (own.state !== "opening") return;
-        await new Promise((done) => setTimeout(done, 100));
+        await wait(100);
     }
 }
 
@@ -95,19 +108,62 @@ const admin = (command) =>
     });
 
 async function route(at) {
-    await admin(`del map ${flag.map} ${session}`);
+    // in one step where the map has the name: a member who asked in between would be led to the first server
+    if (!(await admin(`set map ${flag.map} ${session} ${at}`))) return;
     const answer = await admin(`add map ${flag.map} ${session} ${at}`);
     if (answer) throw new Error(`HAProxy: ${answer}`);
 }
 
-try {
+async function start() {
     const server = await allocate();
     await open(server.at);
     if (flag.admin) await route(server.at);
     const address = `${flag.site || `http://${server.at}`}/?session=${session}`;
     const ticket = makeTicket(flag.role, 3600, "--session", session);
     console.log(JSON.stringify({ address, session, ticket, server: server.name }));
-} catch (error) {
+    return server;
+}
+
+/**
+ * Waits until the session needs another server: true; or none any more, since it was ended or had nobody: false. A server
+ * has ended when Agones has none of that name: it keeps the object until the pod is gone, so two never record one session.
+ */
+async function needsAnother({ name, at }) {
+    const url = `${flag.api}/apis/agones.dev/v1/namespaces/${flag.namespace}/gameservers/${name}`;
+    const within = () => ({ signal: AbortSignal.timeout(ANSWER_MS) });
+    for (let nEmpty = 0; ; await wait(LOOK_MS)) {
+        const own = await find(at, within()).catch(() => null); // null: no answer
+        if (own) {
+            nEmpty = own.members + own.viewers > 0 ? 0 : nEmpty + 1;
+            if (nEmpty === EMPTY_LOOKS) console.error(`allocate: nobody is in ${session}`);
+            continue;
+        }
+        const status = await fetch(url, within())
+            .then((answer) => answer.status)
+            .catch(() => 0);
+        if (status === 404) return nEmpty < EMPTY_LOOKS;
+        if (status === 200 && own !== null) return false;
+    }
+}
+
+const complain = (error) =>
     console.error(`allocate: ${error.cause?.code ? `${error.message}: ${error.cause.code}` : error.message}`);
+
+/** the same on another server, as soon as there is one */
+async function startAgain() {
+    for (;;)
+        try {
+            return await start();
+        } catch (error) {
+            complain(error);
+            await wait(LOOK_MS);
+        }
+}
+
+try {
+    let server = await start();
+    while (flag.keep && (await needsAnother(server))) server = await startAgain();
+} catch (error) {
+    complain(error);
     process.exit(1);
 }

@@ -4,11 +4,12 @@
 #include "server/commands/commands.h"
 #include "server/commands/scene_input.h"
 #include "server/commands/shown_moment.h"
-#include "server/commands/vtu_series.h"
+#include "server/commands/vtk_series.h"
 #include "server/session/replay.h"
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 static cJSON *as_json(const pal_replay_report *r, double seconds)
 {
@@ -26,12 +27,13 @@ static cJSON *as_json(const pal_replay_report *r, double seconds)
 typedef struct arguments {
     bool strict;
     double rate_hz;
+    const char *vtp; /* a file or a folder */
 } arguments;
 
 typedef struct replay_run {
     pal_flag_common common;
     pal_scene_input input;
-    pal_vtu_series series; /* folder NULL: none is asked for */
+    pal_vtk_series elements, surfaces; /* folder NULL: none is asked for */
     pal_shown_moment moment;
     uint64_t n_step; /* so far; a reset of the world does not set it back */
     pal_err write_err;
@@ -48,7 +50,9 @@ static bool step(void *user, const pal_world *world, double fraction)
     replay_run *run = user;
     run->n_step++;
     pal_report_progress("replay", fraction, &run->common);
-    if (run->series.folder) run->write_err = pal_vtu_series_step(&run->series, world, now_s(run), &run->write_diag);
+    if (run->elements.folder) run->write_err = pal_vtk_series_step(&run->elements, world, now_s(run), &run->write_diag);
+    if (!run->write_err && run->surfaces.folder)
+        run->write_err = pal_vtk_series_step(&run->surfaces, world, now_s(run), &run->write_diag);
     if (!run->write_err)
         run->write_err =
             pal_shown_moment_step(&run->moment, run->input.studied.scene, world, now_s(run), &run->write_diag);
@@ -66,11 +70,13 @@ static pal_err replay(replay_run *run, const char *log, const char *scene, bool 
 {
     const pal_replay_watch watch = {.step = step, .user = run, .end = end};
     PAL_TRY(pal_scene_input_open(scene, &run->input, diag));
+    run->surfaces.scene = run->input.studied.scene;
     if (strict) PAL_TRY(pal_replay_run(log, NULL, NULL, report, diag));
     if (strict && report->cut[0]) return PAL_REFUSE(diag, "%s", report->cut);
     pal_err err = pal_replay_run(log, run->input.studied.scene, &watch, report, diag);
     if (run->write_err) return *diag = run->write_diag, run->write_err;
-    return !err && run->series.folder ? pal_vtu_series_end(&run->series, diag) : err;
+    if (!err && run->elements.folder) err = pal_vtk_series_end(&run->elements, diag);
+    return !err && run->surfaces.folder ? pal_vtk_series_end(&run->surfaces, diag) : err;
 }
 
 static void print(const replay_run *run, const pal_replay_report *report)
@@ -81,7 +87,9 @@ static void print(const replay_run *run, const pal_replay_report *report)
                (unsigned long long)report->n_tick, (unsigned long long)report->n_pose,
                (unsigned long long)report->n_command, (unsigned long long)report->n_hash,
                (unsigned long long)report->last_hash);
-    if (run->series.folder) printf("wrote %d moments, %s/series.pvd\n", run->series.n_moment, run->series.folder);
+    if (run->elements.folder) printf("wrote %d moments, %s/series.pvd\n", run->elements.n_moment, run->elements.folder);
+    if (run->surfaces.folder)
+        printf("wrote %d moments, %s/surfaces.pvd\n", run->surfaces.n_moment, run->surfaces.folder);
     if (moment->glb) printf("wrote %s, the surfaces at %.9g s\n", moment->glb, moment->time_s);
     if (moment->vtp) printf("wrote %s, the surfaces at %.9g s\n", moment->vtp, moment->time_s);
 }
@@ -92,15 +100,17 @@ static int parse(int argc, char **argv, arguments *args, replay_run *run, const 
     int n = 0;
     const pal_flag flag[] = {
         {"--strict", NULL, PAL_FLAG_SWITCH, &args->strict, 0, 0, "refuse a log that is cut or damaged"},
-        {"--vtu", "FOLDER", PAL_FLAG_TEXT, &run->series.folder, 0, 0,
+        {"--vtu", "FOLDER", PAL_FLAG_TEXT, &run->elements.folder, 0, 0,
          "write the deformed elements with their fields for ParaView, which opens FOLDER/series.pvd"},
-        {"--rate", "HZ", PAL_FLAG_NUMBER, &args->rate_hz, 0.01, 1000, "moments of --vtu in a simulated second (25)"},
+        {"--rate", "HZ", PAL_FLAG_NUMBER, &args->rate_hz, 0.01, 1000,
+         "moments of --vtu and --vtp FOLDER in a simulated second (25)"},
         {"--gltf", "FILE.glb", PAL_FLAG_TEXT, &run->moment.glb, 0, 0,
          "write the surfaces at one moment as glTF: metres, y up, a material for each body and image"},
-        {"--vtp", "FILE.vtp", PAL_FLAG_TEXT, &run->moment.vtp, 0, 0,
-         "write them for ParaView, in the frame of the scene, with their displacement"},
+        {"--vtp", "PATH", PAL_FLAG_TEXT, &args->vtp, 0, 0,
+         "write them for ParaView, in the frame of the scene, with their displacement: FILE.vtp, or all moments into a "
+         "folder, FOLDER/surfaces.pvd"},
         {"--at", "SECONDS", PAL_FLAG_NUMBER, &run->moment.at_s, 0, 1e6,
-         "the moment of --gltf and --vtp, simulated time since the start of the log (its end)"},
+         "the moment of --gltf and --vtp FILE.vtp, simulated time since the start of the log (its end)"},
     };
     const pal_flag_table table = {
         .usage = "replay LOG SCENE [flags]",
@@ -115,9 +125,14 @@ static int parse(int argc, char **argv, arguments *args, replay_run *run, const 
         .operands = {2, 2}};
     const int code = pal_flags_parse(&table, argc, argv, &run->common, word, &n);
     if (code >= 0) return code;
+    const size_t n_path = args->vtp ? strlen(args->vtp) : 0;
+    if (n_path > 4 && !strcmp(args->vtp + n_path - 4, ".vtp"))
+        run->moment.vtp = args->vtp;
+    else
+        run->surfaces.folder = args->vtp;
     if (isfinite(run->moment.at_s) && !run->moment.glb && !run->moment.vtp)
-        return pal_flags_wrong(&run->common, "--at: goes with --gltf or --vtp");
-    run->series.period_s = 1 / args->rate_hz;
+        return pal_flags_wrong(&run->common, "--at: goes with --gltf or --vtp FILE.vtp");
+    run->elements.period_s = run->surfaces.period_s = 1 / args->rate_hz;
     return -1;
 }
 
@@ -133,7 +148,8 @@ int command_replay(int argc, char **argv)
 
     const double start = pal_clock_s();
     const pal_err err = replay(&run, word[0], word[1], args.strict, &report, &diag);
-    pal_vtu_series_free(&run.series);
+    pal_vtk_series_free(&run.elements);
+    pal_vtk_series_free(&run.surfaces);
     pal_report_progress(NULL, 0, &run.common);
     pal_scene_input_close(&run.input);
     if (err) return pal_report_refusal(&run.common, err, &diag);

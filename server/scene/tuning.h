@@ -3,7 +3,7 @@
 #define PAL_SCENE_TUNING_H
 
 /* kept voxels (13,000 tetrahedra) and, for model fem, nodes that run live on one core; elements of a solid;
- * tests/scene/test_scene_file.c */
+ * tests/scene/test_surface_scene.c */
 enum { PAL_WANTED_VOXELS = 2600, PAL_WANTED_NODES = 2500, PAL_WANTED_ELEMENTS = 2000 };
 /* triangles of a scan's surface; of the coarsest level of an adaptive surface, which becomes so coarse when it has more
  * than PAL_MANY_TRI: it would hardly keep real time; tests/scene/test_adaptive_scene.c */

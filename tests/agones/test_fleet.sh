@@ -1,7 +1,7 @@
 #!/bin/sh
-# Three servers behind HAProxy by the session's name: allocate.mjs opens a scene, four clients join through the gateway,
-# their server is killed and another goes on with the session, which is drained in turn. The Kubernetes API is a fake,
-# everything else is real. usage: test_fleet.sh FOLDER_OF_PROGRAMS
+# Three servers behind HAProxy by the session's name: allocate.mjs opens a scene and keeps it, four clients join through the
+# gateway, their server is killed and another goes on with the session, which is drained in turn. The Kubernetes API is a
+# fake, everything else is real. usage: test_fleet.sh FOLDER_OF_PROGRAMS
 bin=${1:?usage: test_fleet.sh FOLDER_OF_PROGRAMS}
 here=$(cd "$(dirname "$0")" && pwd)
 . "$here/../clients/rig.sh"
@@ -33,22 +33,23 @@ node "$here/fake_kubernetes.mjs" "$work/servers" >"$work/api" &
 api=$!
 pids="$pids $api"
 shows "$work/api" $api '^port '
-session=one
-allocate() { # allocate NAME PORT: what is free, else nothing; opens $session; what it prints is in $work/got
-    echo "${*:-}" >"$work/servers"
-    node "$here/../../deploy/agones/allocate.mjs" ball.json --session $session --api "http://127.0.0.1:$(sed -n 's/^port //p' "$work/api")" \
-        --namespace games --keys "$work/keys" --palpate "$bin/palpate" --site "https://127.0.0.1:$https" --admin "$work/admin" --map "$work/map" \
-        >"$work/got" 2>"$work/got.err"
+free() { # free K: of the fleet the server of that number is, until the next call
+    eval "echo gs-$1 \$port$1 \$pid$1" >"$work/servers"
 }
-allocate
+allocates="node $here/../../deploy/agones/allocate.mjs ball.json --api http://127.0.0.1:$(sed -n 's/^port //p' "$work/api") --namespace games
+    --keys $work/keys --palpate $bin/palpate --site https://127.0.0.1:$https --admin $work/admin --map $work/map"
+$allocates --session one >"$work/got" 2>"$work/got.err"
 check "without a free server there is none" $?/"$(grep -c 'no game server is free: UnAllocated' "$work/got.err")" == 1/1
-allocate gs-1 "$port1"
-check "a scene is opened" $? == 0
-check "on the server that is allocated" "$(json server "$work/got")" == gs-1
-address=$(sed 's/.*"address":"\([^"]*\)".*/\1/' "$work/got")
+free 1
+$allocates --session one --keep >"$work/kept" 2>"$work/kept.err" &
+keeper=$!
+pids="$pids $keeper"
+shows "$work/kept" $keeper '"server":"gs-1"'
+check "a scene is opened on the server that is allocated" $? == 0
+address=$(sed 's/.*"address":"\([^"]*\)".*/\1/' "$work/kept")
 check "its address is the gateway's" "$address" == "https://127.0.0.1:$https/?session=one"
-ticket=$(json ticket "$work/got")
-allocate gs-1 "$port1"
+ticket=$(json ticket "$work/kept")
+$allocates --session one >"$work/got" 2>"$work/got.err"
 check "a name that is in use is refused" $?/"$(grep -c '409 there is a session one' "$work/got.err")" == 1/1
 
 export PALPATE_CA="$work/cert"
@@ -61,8 +62,11 @@ members 4
 check "four members are inside" $? == 0
 
 # another session is opened, used and ended meanwhile
-session=two
-allocate gs-2 "$port2"
+free 2
+$allocates --session two --keep >"$work/got" 2>"$work/got.err" &
+second=$!
+pids="$pids $second"
+shows "$work/got" $second '"server":"gs-2"'
 two=$(sed 's/.*"address":"\([^"]*\)".*/\1/' "$work/got")
 timeout 100 "$bin/palpate-client" "$two#$(json ticket "$work/got")" --json --script press --seconds 60 --until cycles=20 >"$work/second" \
     2>"$work/second.err"
@@ -75,20 +79,31 @@ node -e '
     fetch(`http://127.0.0.1:${port}/sessions`, { method: "POST", headers, body: `{"end":"two"}` }).then((answer) => console.log(answer.status))
     ' "$port2" "$("$bin/palpate" ticket --keys "$work/keys" --role instructor --quiet)" >"$work/ended"
 check "and is ended" "$(cat "$work/ended")" == 200
-session=one
+wait $second
+check "which is the end of its keeping" $? == 0
+
 kill -KILL "$pid1"
 wait "$job1" 2>/dev/null
-allocate gs-2 "$port2"
+shows "$work/kept" $keeper '"server":"gs-2"'
 check "the killed server's session is opened on another" $? == 0
 check "which goes on with its recording" "$(grep -c 'one goes on where .*log.one ends' "$work/serve2.err")" == 1
 members 4
 check "its four members come back" $? == 0
+free 3
 kill -TERM "$pid2"
 wait "$job2"
 check "a server that is drained ends with 0" $? == 0
-allocate gs-3 "$port3"
+shows "$work/kept" $keeper '"server":"gs-3"'
 check "its session is opened on the third" $? == 0
 wait $clients
 check "and the four are there" $? == 0
 check "each has come back twice" "$(json reconnects "$work/clients")" '>=' 8
+
+$allocates --session three --keep >"$work/got" 2>"$work/got.err" &
+third=$!
+pids="$pids $third"
+shows "$work/got.err" $third 'nobody is in three'
+kill -KILL "$pid3"
+wait $third
+check "a session that nobody is in is not opened again" $?/"$(wc -l <"$work/got")" == 0/1
 finish

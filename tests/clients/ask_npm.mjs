@@ -1,11 +1,13 @@
-// What the npm package answers, imported by its name. usage: ask_npm.mjs packets FOLDER | touch URL
+// What the npm package answers, imported by its name. usage: ask_npm.mjs packets FOLDER | touch URL [PACKAGES] | lost URL [PACKAGES]
+// with PACKAGES, the folder of node_modules/ws, over that package in place of the runtime's WebSocket
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
+import { createRequire } from "node:module";
 import { join as joinPath } from "node:path";
 import { addressOf, applyTopologyDelta, decodeAsset, decodeField, FrameDecoder, join } from "palpate-client";
 import { readControl, readHaptic, readTools, WireError, writeAck, writePose } from "palpate-client";
 
-const [part, where] = process.argv.slice(2);
+const [part, where, packages] = process.argv.slice(2);
 
 /** @param {string} name */
 const load = (name) => new Uint8Array(readFileSync(joinPath(where, name)));
@@ -39,6 +41,24 @@ function packets() {
     assert.throws(() => addressOf("ftp://host/"), /no address/);
 }
 
+const WS = packages && createRequire(joinPath(packages, "package.json"))("ws");
+const open = WS && ((url, protocols) => new WS(url, protocols));
+
+/** nobody answers: it is told, and tried again */
+function lost() {
+    const states = [];
+    const session = join(
+        where,
+        (message) => {
+            if (message.type === "state") states.push(message.state);
+            if (states.length < 4) return;
+            assert.deepEqual(states, ["connecting", "lost", "connecting", "lost"]);
+            session.close();
+        },
+        { open },
+    );
+}
+
 /** grasps the top of the ball and pulls it up by 10 mm, a half at a time; each step has used the pose before the next */
 function touch() {
     const radius = 0.008;
@@ -47,7 +67,7 @@ function touch() {
     let lowering = true;
     let rises = 0;
     let top = 0;
-    const session = join(where, (message) => {
+    const take = (message) => {
         if (message.type === "control" && message.message.type === "hello") own = message.message.you.tool ?? -1;
         if (message.type === "frame")
             for (let i = 2; i < message.positions.length; i += 3) top = Math.max(top, message.positions[i]);
@@ -66,8 +86,8 @@ function touch() {
         else if (grasps) ((height += 5e-4), rises++);
         lowering &&= !grasps;
         session.move([0, 0, 0.04 + height], height <= 0.5 * radius || !lowering);
-    });
+    };
+    const session = join(where, take, { open });
 }
 
-if (part === "packets") packets();
-else touch();
+({ packets, touch, lost })[part]();

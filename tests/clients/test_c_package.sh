@@ -11,8 +11,8 @@ for tool in cc pkg-config cmake; do
     }
 done
 cmake --install "$bin/.." --prefix "$work/usr" --component dev >"$work/install.log" || exit 1
-# 15 headers, the library, its .pc, the licence
-check "files of the package" "$(find "$work/usr" -type f | wc -l)" == 18
+# 16 headers, the library, its .pc, the licence
+check "files of the package" "$(find "$work/usr" -type f | wc -l)" == 19
 export PKG_CONFIG_PATH="$work/usr/lib/pkgconfig"
 flags=$(pkg-config --cflags --libs palpate-client) || exit 1
 check "its version is that of the programs" "\"$(pkg-config --modversion palpate-client)\"" == \
@@ -34,5 +34,7 @@ timeout 100 ./press "$url" >press.out
 check "the example runs to its end" $? == 0
 check "steps" "$(wc -l <press.out)" == 61
 check "no force 10 mm above the tissue, N" "$(sed -n 's/^-10.0 mm //p' press.out | cut -d' ' -f1)" == 0
+timeout 100 ./press "http://127.0.0.1:$port/?session=none" >none.out 2>none.err
+check "a session that is not there is told" $?/"$(grep -c 'press: the server refuses: 4004' none.err)" == 1/1
 check "force at 20 mm, N" "$(sed -n 's/^20.0 mm //p' press.out | cut -d' ' -f1)" '>' 0.1
 finish

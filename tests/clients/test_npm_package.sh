@@ -44,14 +44,22 @@ check "a typed program compiles" $? == 0
 cp "$here/ask_npm.mjs" .
 timeout 100 node ask_npm.mjs packets "$tree/tests/data/golden"
 check "golden packets" $? == 0
+make_scene
+start_server --port 0
+if [ -e "$packages/node_modules/ws" ]; then
+    timeout 100 node ask_npm.mjs touch "$url" "$packages"
+    check "a ball is pulled over the package ws" $? == 0
+    timeout 100 node ask_npm.mjs lost "http://127.0.0.1:1/" "$packages"
+    check "where there is no server, it is tried again" $? == 0
+else
+    echo "SKIP a ball is pulled over the package ws: it is not there"
+fi
 websocket=
 node -e 'process.exit(typeof WebSocket === "undefined" ? 1 : 0)' || websocket=--experimental-websocket
 if node $websocket -e 0 2>/dev/null; then
-    make_scene
-    start_server --port 0
     timeout 100 node --no-warnings $websocket ask_npm.mjs touch "$url"
     check "a ball is pulled" $? == 0
 else
-    echo "SKIP a ball is pulled: this Node has no WebSocket"
+    echo "SKIP a ball is pulled over the runtime's WebSocket: this Node has none"
 fi
 finish

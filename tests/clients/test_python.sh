@@ -22,6 +22,21 @@ else
 fi
 asks packets "$tree/tests/data/golden"
 check "golden packets and bad bytes" $? == 0
+if "$python" -c 'import setuptools, wheel, pip' 2>/dev/null; then
+    cp -r "$tree/clients/python" "$work/source" # setuptools leaves files there
+    "$python" -m venv --system-site-packages --without-pip "$work/venv"
+    (
+        unset PYTHONPATH
+        cd "$work" || exit 1
+        timeout 200 "$work/venv/bin/python" -m pip install --no-index --no-build-isolation --no-cache-dir "$work/source" >"$work/pip.log" 2>&1
+        timeout 200 "$work/venv/bin/python" "$here/ask_python.py" packets "$tree/tests/data/golden"
+    )
+    check "pip installs it without a network" $? == 0
+    version=$("$work/venv/bin/python" -c 'import importlib.metadata as m; print(m.version("palpate"))')
+    check "its version is that of the programs" "\"$version\"" == "\"$("$bin/palpate" --version | sed 's/^palpate \([0-9.]*\).*/\1/')\""
+else
+    echo "SKIP pip installs it: no pip (python3-pip)"
+fi
 make_scene
 start_server --port 0
 asks touch "$url"

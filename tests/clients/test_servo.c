@@ -1,88 +1,6 @@
-/* The bridge's servo in virtual time against a simulated server: states, limits, felt stiffness. */
-#include "clients/haptic_bridge/device_virtual.h"
+/* The bridge's servo in virtual time against a simulated server: states, limits, felt stiffness, workspace. */
 #include "clients/haptic_bridge/jitter.h"
-#include "clients/haptic_bridge/servo.h"
-#include "server/base/vec3.h"
-#include "tests/check.h"
-#include "tests/fixtures/random.h"
-
-#define TICK_NS  1000000u
-#define FRAME_NS 16666667u
-
-typedef struct trial {
-    void *device;
-    pal_servo *servo;
-    uint64_t now_ns;
-    uint32_t seq, generation;
-    pal_wire_haptic model;
-    bool serving; /* models come at 60 Hz */
-    uint64_t next_model_ns;
-    pal_servo_view view;
-} trial;
-
-/* tissue below z = 0 of the world; device and world have the same axes */
-static const pal_servo_options level = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
-static bool rig_open_as(trial *r, const char *id, double k1, const pal_servo_options *options)
-{
-    *r = (trial){.now_ns = 1000000000, .generation = 1, .serving = true};
-    pal_servo_options o = *options;
-    o.backend = pal_device_virtual();
-    o.rate_hz = 1000;
-    const int32_t dof_out = o.info.dof_out;
-    if (pal_device_virtual()->open(&r->device, id, &o.info)) return false;
-    o.device = r->device;
-    if (dof_out) o.info.dof_out = dof_out;
-    pal_device_virtual()->force_enable(r->device, 1);
-    r->model = (pal_wire_haptic){.n_patch = 1, .frame_us = 16667};
-    r->model.patch[0] = (pal_wire_contact_patch){.id = 1, .group = 1, .n = {0, 0, 1}, .k1_N_m = (float)k1};
-    return pal_servo_create(&o, &r->servo) == PAL_ERR_OK;
-}
-static bool rig_open(trial *r, const char *id, double k1)
-{
-    return rig_open_as(r, id, k1, &level);
-}
-static void rig_close(trial *r)
-{
-    pal_servo_destroy(r->servo);
-    pal_device_virtual()->close(r->device);
-}
-
-/* the next model, made at a time, arrives now */
-static void rig_model(trial *r, uint64_t made_ns)
-{
-    r->model.seq = ++r->seq;
-    r->model.stamp_us = made_ns / 1000;
-    pal_servo_put_model(r->servo, &r->model, r->generation, r->now_ns);
-}
-
-static void rig_tick(trial *r)
-{
-    if (r->serving && r->now_ns >= r->next_model_ns) {
-        rig_model(r, r->now_ns);
-        r->next_model_ns = r->now_ns + FRAME_NS;
-    }
-    pal_servo_tick(r->servo, r->now_ns);
-    const pal_servo_view *view = pal_servo_take_view(r->servo);
-    if (view) r->view = *view;
-    pal_virtual_advance(r->device, 1e-3);
-    r->now_ns += TICK_NS;
-}
-static void rig_run(trial *r, double seconds)
-{
-    for (int i = 0; i < (int)(seconds * 1000); i++) rig_tick(r);
-}
-static double rig_force(const trial *r)
-{
-    const double *f = r->view.force_N;
-    return sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
-}
-static bool rig_event(trial *r, int kind)
-{
-    pal_servo_event event;
-    bool found = false;
-    while (pal_servo_take_event(r->servo, &event)) found = found || event.kind == kind;
-    return found;
-}
+#include "tests/fixtures/servo_trial.h"
 
 /* carries the device to a place at 0.4 m/s */
 static void rig_carry(trial *r, const double to[3])
@@ -134,160 +52,6 @@ static void press_and_hold_on_a_plane_is_stable_and_feels_its_stiffness(void)
             rig_close(&r);
         }
     }
-}
-
-static void stale_model_fades_out_in_100_and_500_ms_and_comes_back_slowly(void)
-{
-    trial r;
-    REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
-    rig_run(&r, 4);
-    const double before = rig_force(&r);
-    CHECK(before > 0.1);
-    r.serving = false;
-    const uint64_t last = r.next_model_ns - FRAME_NS;
-    double worst_step = 0, at = before;
-    while (r.now_ns < last + 99000000) rig_tick(&r);
-    CHECK_NEAR(rig_force(&r), before, 0.02);
-    CHECK_INT(r.view.flags & PAL_WIRE_POSE_STALE, 0);
-    while (r.now_ns < last + 602000000) {
-        rig_tick(&r);
-        worst_step = fmax(worst_step, fabs(rig_force(&r) - at));
-        at = rig_force(&r);
-    }
-    CHECK_LE(worst_step, 0.1);
-    CHECK(r.view.flags & PAL_WIRE_POSE_STALE);
-    CHECK_NEAR(r.view.fade, 0, 0);
-    CHECK(rig_event(&r, PAL_EVENT_STALE));
-    /* what is left is damping of 0.5 N s/m */
-    rig_run(&r, 2);
-    CHECK_LE(rig_force(&r), 0.005);
-    CHECK_INT(r.view.state, PAL_SERVO_FREE);
-    r.serving = true;
-    at = rig_force(&r);
-    worst_step = 0;
-    for (int i = 0; i < 1000; i++) {
-        rig_tick(&r);
-        worst_step = fmax(worst_step, rig_force(&r) - at);
-        at = rig_force(&r);
-    }
-    CHECK_LE(worst_step, 0.05);
-    CHECK(at > 0.1);
-    CHECK(rig_event(&r, PAL_EVENT_RECOVERED));
-    rig_close(&r);
-}
-
-/* the network thread is another one: its stamp may lie after the time with which the tick began */
-static void model_that_comes_during_the_tick_is_fresh(void)
-{
-    trial r;
-    REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
-    rig_run(&r, 4);
-    r.model.seq = ++r.seq;
-    r.model.stamp_us = r.now_ns / 1000 + 5;
-    pal_servo_put_model(r.servo, &r.model, r.generation, r.now_ns + 5000);
-    rig_tick(&r);
-    CHECK_INT(r.view.model_seq, r.seq);
-    CHECK_INT(r.view.model_age_us, 0);
-    CHECK_INT(r.view.n_stale, 0);
-    CHECK_NEAR(r.view.fade, 1, 0);
-    rig_close(&r);
-}
-
-/* a stream stands still; then its oldest models arrive, one each tick, of a surface that is now 4 mm higher, now lower
- */
-static void models_of_a_stall_that_arrive_in_a_burst_are_stale(void)
-{
-    for (int t = 0; t < 2; t++) {
-        trial r;
-        REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
-        rig_run(&r, 4);
-        CHECK(rig_force(&r) > 0.1);
-        const uint64_t began = r.next_model_ns;
-        const int n_late = t ? 80 : 9; /* the newest of them 150 ms old or more */
-        double fade = 1, step = 0, at[3];
-        r.serving = false;
-        rig_run(&r, t ? 1.5 : 0.3);
-        fade = r.view.fade;
-        CHECK_NEAR(fade, t ? 0 : 0.6, 0.05);
-        pal_copy3(at, r.view.force_N);
-        for (int i = 0; i < n_late; i++) {
-            const uint64_t made = began + (uint64_t)i * FRAME_NS;
-            r.model.patch[0].p_m[2] = i % 2 ? 0.004f : -0.004f;
-            rig_model(&r, made);
-            rig_tick(&r);
-            CHECK(r.view.flags & PAL_WIRE_POSE_STALE);
-            /* a hundredth of the stall is forgotten */
-            CHECK_NEAR(r.view.model_age_us, (double)(r.now_ns - TICK_NS - made) * 1e-3, t ? 16e3 : 4e3);
-            CHECK_NEAR(r.view.fade, fmax(0, fade - 2e-3 * (i + 1)), 1e-9);
-            step = fmax(step, pal_dist3(at, r.view.force_N));
-            pal_copy3(at, r.view.force_N);
-        }
-        CHECK_INT(r.view.n_stale, 1);
-        /* models in time again */
-        r.model.patch[0].p_m[2] = 0;
-        r.next_model_ns = r.now_ns;
-        r.serving = true;
-        for (int i = 0; i < 2000; i++) {
-            rig_tick(&r);
-            step = fmax(step, pal_dist3(at, r.view.force_N));
-            pal_copy3(at, r.view.force_N);
-        }
-        printf("  stall of %g s: largest step %.3f N, at the end %.2f N\n", t ? 1.5 : 0.3, step, rig_force(&r));
-        CHECK_LE(step, 0.1);
-        CHECK_INT(r.view.n_stale, 1);
-        CHECK(rig_force(&r) > 0.1);
-        rig_close(&r);
-    }
-}
-
-/* one way of a round trip of 150 ms with jitter of 50 ms, in order; then the way is longer by 200 ms for good */
-static void jitter_makes_nothing_stale_and_a_longer_way_becomes_the_usual_one(void)
-{
-    trial r;
-    REQUIRE(rig_open(&r, "premium,script=cycle,clock=virtual", 300));
-    uint64_t seed = 7, made = r.now_ns, arrives = 0, oldest_us = 0, stale_ticks = 0;
-    double peak = 0;
-    r.serving = false;
-    for (int i = 0; i < 50000; i++) {
-        const double way = 0.075 + 0.025 * random_signed(&seed) + (i < 30000 ? 0 : 0.2);
-        if (arrives == 0) arrives = made + (uint64_t)(way * 1e9);
-        if (arrives <= r.now_ns) {
-            rig_model(&r, made);
-            made += FRAME_NS;
-            arrives = 0;
-        }
-        rig_tick(&r);
-        if (i < 30000) {
-            CHECK_INT(r.view.n_stale, 0);
-            oldest_us = r.view.model_age_us > oldest_us ? r.view.model_age_us : oldest_us;
-        }
-        if (i >= 45000) peak = fmax(peak, rig_force(&r));
-        if (i >= 31000) stale_ticks += (r.view.flags & PAL_WIRE_POSE_STALE) != 0;
-    }
-    printf("  jitter: oldest model %.1f ms; longer way: stale for %.1f s, then %.2f N\n", (double)oldest_us * 1e-3,
-           1 + (double)stale_ticks * 1e-3, peak);
-    /* the jitter and the distance of two models */
-    CHECK_LE(oldest_us, 70000);
-    CHECK(oldest_us > 50000);
-    CHECK(stale_ticks > 5000 && stale_ticks < 14000);
-    CHECK(peak > 0.5);
-    rig_close(&r);
-}
-
-/* every 30 ms a model of a rising surface; from the second half on all are 10 ms late */
-static void surface_of_a_late_model_moves_on_from_when_it_was_made(void)
-{
-    trial r;
-    REQUIRE(rig_open(&r, "inverse3,script=press-hold,clock=virtual", 300));
-    rig_run(&r, 5);
-    r.serving = false;
-    r.model.patch[0].v_m_s[2] = 0.002f;
-    for (int i = 0; i < 600; i++) {
-        if (i % 30 == 0) rig_model(&r, r.now_ns - (i < 300 ? 0 : 10000000));
-        rig_tick(&r);
-        if (i % 300 == 299) CHECK_NEAR(r.view.proxy_m[0][2], 0.002 * (i < 300 ? 0.029 : 0.039), 0.002 * 0.003);
-    }
-    rig_close(&r);
 }
 
 static void emergency_stop_takes_force_away_within_two_ticks_and_stays(void)
@@ -382,51 +146,6 @@ static void stiffness_above_the_device_is_rendered_at_its_clamp(void)
     CHECK_NEAR(r.view.fade, 0, 0);
     CHECK_LE(rig_force(&r), 1e-9);
     CHECK(rig_event(&r, PAL_EVENT_RT_DEGRADED));
-    rig_close(&r);
-}
-
-static void old_models_are_dropped_and_a_new_session_starts_afresh(void)
-{
-    trial r;
-    REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
-    rig_run(&r, 4);
-    const uint32_t seq = r.view.model_seq;
-    pal_wire_haptic old = r.model;
-    old.seq = seq - 3;
-    r.serving = false;
-    pal_servo_put_model(r.servo, &old, r.generation, r.now_ns);
-    rig_tick(&r);
-    CHECK_INT(r.view.model_seq, seq);
-    CHECK_INT(r.view.n_model_old, 1);
-    pal_servo_put_generation(r.servo, ++r.generation);
-    rig_tick(&r);
-    CHECK_INT(r.view.model_seq, 0);
-    CHECK_LE(rig_force(&r), 0.05);
-    /* a server that starts again counts from 1, and is believed */
-    r.seq = 0;
-    r.serving = true;
-    r.next_model_ns = r.now_ns;
-    rig_run(&r, 0.002);
-    CHECK_INT(r.view.model_seq, 1);
-    CHECK_LE(r.view.fade, 0.02);
-    rig_run(&r, 1);
-    CHECK(rig_force(&r) > 0.1);
-    rig_close(&r);
-}
-
-static void numbers_that_are_not_finite_in_a_model_give_a_fault_not_a_force(void)
-{
-    trial r;
-    REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
-    rig_run(&r, 4);
-    r.model.patch[0].k1_N_m = NAN;
-    for (int i = 0; i < 100; i++) {
-        rig_tick(&r);
-        CHECK(isfinite(rig_force(&r)));
-    }
-    CHECK_NEAR(rig_force(&r), 0, 0);
-    CHECK(r.view.n_not_finite > 0);
-    CHECK(rig_event(&r, PAL_EVENT_FAULT));
     rig_close(&r);
 }
 
@@ -644,54 +363,6 @@ static void torque_goes_to_devices_that_have_it(void)
     }
 }
 
-/* nothing arrives any more, or only repeats of an old number: without force after the stale time and its fade */
-static void silence_and_repeats_of_an_old_model_end_the_force(void)
-{
-    for (int repeats = 0; repeats < 2; repeats++) {
-        trial r;
-        REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
-        rig_run(&r, 4);
-        CHECK(rig_force(&r) > 0.1);
-        r.serving = false;
-        for (int i = 0; i < 620; i++) {
-            if (repeats && i % 16 == 0) pal_servo_put_model(r.servo, &r.model, r.generation, r.now_ns);
-            rig_tick(&r);
-        }
-        CHECK_NEAR(r.view.fade, 0, 0);
-        rig_run(&r, 0.3);
-        CHECK_LE(rig_force(&r), 0.02); /* damping of the free handle */
-        CHECK_INT(repeats ? r.view.n_model_old > 30 : r.view.n_model_old == 0, 1);
-        rig_close(&r);
-    }
-}
-
-/* a server that comes back as another session finds an empty tank: pressed deep, nothing kicks */
-static void new_session_begins_with_an_empty_tank(void)
-{
-    trial r;
-    REQUIRE(rig_open(&r, "inverse3,script=press-hold,clock=virtual", 300));
-    rig_run(&r, 4);
-    CHECK(r.view.tank_mJ > 0.5);
-    const double generated = r.view.generated_mJ;
-    pal_servo_put_generation(r.servo, ++r.generation);
-    r.serving = false;
-    rig_run(&r, 0.002);
-    CHECK_LE(r.view.tank_mJ, 0);
-    CHECK_NEAR(r.view.fade, 0, 0);
-    r.seq = 0;
-    r.serving = true;
-    r.next_model_ns = r.now_ns;
-    double before = 0, step = 0;
-    for (int i = 0; i < 3000; i++) {
-        rig_tick(&r);
-        step = fmax(step, rig_force(&r) - before);
-        before = rig_force(&r);
-    }
-    CHECK_LE(step, 0.1);
-    CHECK_LE(r.view.generated_mJ, fmax(generated, 0) + fmax(0, -r.view.tank_mJ) + 1e-9);
-    rig_close(&r);
-}
-
 static void proxy_is_published_on_the_surface(void)
 {
     trial r;
@@ -722,18 +393,11 @@ static void jitter_histogram_finds_percentiles_within_a_step(void)
 int main(void)
 {
     RUN(press_and_hold_on_a_plane_is_stable_and_feels_its_stiffness);
-    RUN(stale_model_fades_out_in_100_and_500_ms_and_comes_back_slowly);
-    RUN(model_that_comes_during_the_tick_is_fresh);
-    RUN(models_of_a_stall_that_arrive_in_a_burst_are_stale);
-    RUN(jitter_makes_nothing_stale_and_a_longer_way_becomes_the_usual_one);
-    RUN(surface_of_a_late_model_moves_on_from_when_it_was_made);
     RUN(emergency_stop_takes_force_away_within_two_ticks_and_stays);
     RUN(both_buttons_held_for_half_a_second_are_an_emergency_stop);
     RUN(force_keeps_its_cap_and_rises_no_faster_than_the_cap_in_10_ms);
     RUN(continuous_rating_scales_a_long_push_down);
     RUN(stiffness_above_the_device_is_rendered_at_its_clamp);
-    RUN(old_models_are_dropped_and_a_new_session_starts_afresh);
-    RUN(numbers_that_are_not_finite_in_a_model_give_a_fault_not_a_force);
     RUN(device_that_stops_answering_is_a_fault_that_stays);
     RUN(handle_driven_faster_than_two_metres_a_second_loses_force);
     RUN(up_of_the_device_is_the_given_direction);
@@ -742,8 +406,6 @@ int main(void)
     RUN(clutch_engages_below_its_force_and_holds_the_world_pose);
     RUN(edge_of_the_workspace_is_a_soft_wall);
     RUN(torque_goes_to_devices_that_have_it);
-    RUN(silence_and_repeats_of_an_old_model_end_the_force);
-    RUN(new_session_begins_with_an_empty_tank);
     RUN(proxy_is_published_on_the_surface);
     RUN(jitter_histogram_finds_percentiles_within_a_step);
     return check_report();

@@ -4,6 +4,7 @@ usage: read_exports.py solution FILE.vtu FILE.csv      points and displacements 
        read_exports.py series FOLDER YOUNG_PA          a series.pvd of one body: times ascend, rest shape and E stay
        read_exports.py ball FILE.mha                   writes a label volume, prints its volume in m^3
        read_exports.py points FOLDER SECONDS           prints the points of that moment of a series as JSON
+       read_exports.py surfaces FOLDER                 a surfaces.pvd: times ascend, triangles of one body move
        read_exports.py surface FILE.vtp                prints points and triangles as JSON
 Prints one line for each fault on stderr; exit code 1 when there is one, 77 without VTK (python3-vtk9).
 """
@@ -55,11 +56,11 @@ def solution(vtu, table):
 
 def series(folder, young_pa):
     rest, before = None, -1.0
-    sets = xml.etree.ElementTree.parse(f"{folder}/series.pvd").findall("./Collection/DataSet")
-    if len(sets) < 2:
-        yield f"{len(sets)} moments"
-    for one in sets:
-        grid, time = read(f"{folder}/{one.get('file')}"), float(one.get("timestep"))
+    all_of_them = moments(f"{folder}/series.pvd")
+    if len(all_of_them) < 2:
+        yield f"{len(all_of_them)} moments"
+    for time, file in all_of_them:
+        grid = read(f"{folder}/{file}")
         if not time > before:
             yield f"time {time} follows {before}"
         before = time
@@ -79,34 +80,68 @@ def series(folder, young_pa):
             yield f"time {time}: a cell is turned inside out"
 
 
+def moments(path):
+    """times and files of a PVD"""
+    sets = xml.etree.ElementTree.parse(path).findall("./Collection/DataSet")
+    return [(float(one.get("timestep")), one.get("file")) for one in sets]
+
+
 def points(folder, seconds):
-    for one in xml.etree.ElementTree.parse(f"{folder}/series.pvd").findall("./Collection/DataSet"):
-        if abs(float(one.get("timestep")) - seconds) < 1e-9:
-            grid = read(f"{folder}/{one.get('file')}")
+    for time, file in moments(f"{folder}/series.pvd"):
+        if abs(time - seconds) < 1e-9:
+            grid = read(f"{folder}/{file}")
             print(json.dumps({"points": [grid.GetPoint(i) for i in range(grid.GetNumberOfPoints())]}))
             return
     yield f"no moment at {seconds} s"
 
 
-def surface(path):
+def read_surface(path):
     reader = vtkXMLPolyDataReader()
     reader.SetFileName(path)
     reader.Update()
-    grid = reader.GetOutput()
-    moved = grid.GetPointData().GetArray("displacement_m")
+    return reader.GetOutput()
+
+
+def faults_of_surface(grid):
+    if any(grid.GetCell(k).GetNumberOfPoints() != 3 for k in range(grid.GetNumberOfCells())):
+        yield "a cell is no triangle"
     body = grid.GetCellData().GetArray("body")
+    if body.GetRange() != (1, 1):
+        yield f"bodies {body.GetRange()}"
+    moved = grid.GetPointData().GetArray("displacement_m")
+    if not 0 < moved.GetMaxNorm() < 1:
+        yield f"the largest displacement is {moved.GetMaxNorm()} m"
+
+
+def surfaces(folder):
+    before, rest = -1.0, None
+    for time, file in moments(f"{folder}/surfaces.pvd"):
+        grid = read_surface(f"{folder}/{file}")
+        if not time > before:
+            yield f"time {time} follows {before}"
+        before = time
+        yield from faults_of_surface(grid)
+        moved = grid.GetPointData().GetArray("displacement_m")
+        now = [
+            x - u for i in range(grid.GetNumberOfPoints()) for x, u in zip(grid.GetPoint(i), moved.GetTuple3(i))
+        ]
+        rest = rest or now
+        # differences of floats below 1 m, rounded when they were taken
+        if len(now) != len(rest) or max(abs(a - b) for a, b in zip(now, rest)) > 1e-12:
+            yield f"time {time}: position less displacement is not the rest shape"
+    if not moved.GetMaxNorm() > 1e-4:
+        yield f"it has sunk by {moved.GetMaxNorm()} m"
+
+
+def surface(path):
+    grid = read_surface(path)
     places = [grid.GetPoint(i) for i in range(grid.GetNumberOfPoints())]
     cells = []
     for k in range(grid.GetNumberOfCells()):
         ids = grid.GetCell(k).GetPointIds()
         cells.append([ids.GetId(c) for c in range(ids.GetNumberOfIds())])
     print(json.dumps({"points": places, "triangles": cells}))
-    if any(len(cell) != 3 for cell in cells):
-        yield "a cell is no triangle"
-    if body.GetRange() != (1, 1):
-        yield f"bodies {body.GetRange()}"
-    if not 0 < moved.GetMaxNorm() < 1:
-        yield f"the largest displacement is {moved.GetMaxNorm()} m"
+    return faults_of_surface(grid)
 
 
 def ball(path):
@@ -137,6 +172,7 @@ kinds = {
     "series": lambda folder, young_pa: series(folder, float(young_pa)),
     "points": lambda folder, seconds: points(folder, float(seconds)),
     "surface": surface,
+    "surfaces": surfaces,
     "ball": ball,
 }
 faults = list(kinds[sys.argv[1]](*sys.argv[2:]))

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Files for and from other tools, read and written by VTK's own Python modules and by three.js: VTU of a solution, a VTU
-# series of a recording, VTP and glTF of a moment, a MetaImage volume in. Prints "N passed, N failed, N skipped"; exit 1
+# series and VTP series of a recording, VTP and glTF of a moment, a MetaImage volume in. Prints "N passed, N failed, N skipped"; exit 1
 # when a check failed.
 # usage: test_exports.sh PALPATE PACKAGES (folder with node_modules of the viewer)
 set -u
@@ -38,17 +38,25 @@ begin "a recording becomes a series for ParaView"
 run prepare --procedural --resolution 8 --model fem -o organ
 check "exit code $code of prepare" code_is 0
 young=$(sed -n 's/.*"young_Pa":[[:space:]]*\([0-9.e+]*\).*/\1/p' organ/scene.json | head -n 1)
-# the name of a body is any text: no file may leave the folder, and none of XML's signs its place
-sed '/"bodies"/,$ s/"name":[[:space:]]*"organ"/"name": "..\/..\/escape <\&\x27>"/
+# the name of a body is any text: no file may leave the folder, and none of XML's signs its place; it sinks by gravity
+sed 's/"step_s":/"gravity_m_s2": 2, "step_s":/; s/"name":[[:space:]]*"sleep"/"name": "gravity"/
+    /"bodies"/,$ s/"name":[[:space:]]*"organ"/"name": "..\/..\/escape <\&\x27>"/
     s/"skin_output"/"surface_output"/' organ/scene.json >organ/named.json
 check "the body has a name with a path" grep -q '"../../escape' organ/named.json
 mv organ/named.json organ/scene.json
 run serve organ/scene.json --record organ.log --port 0 --seconds 0.5
 check "exit code $code of serve" code_is 0
-run replay organ.log organ/scene.json --vtu series --rate 10
+run replay organ.log organ/scene.json --vtu series --vtp surfaces --rate 10
 check "exit code $code of replay" code_is 0
 check "it says where" has out "series/series.pvd"
+check "it says where surfaces are" has out "surfaces/surfaces.pvd"
+run replay organ.log organ/scene.json --vtp then.vtp --at 0.2
+check "exit code $code of replay" code_is 0
+run replay organ.log organ/scene.json --vtp surfaces --at 0.2
+refused 2 '--at: goes with --gltf or --vtp FILE.vtp'
 check "VTK reads another body" reads series series "$young"
+check "VTK reads other surfaces" reads surfaces surfaces
+check "a moment differs from the same alone" same surfaces/surfaces_000002.vtp then.vtp
 check "the folder has all files" test "$(ls series/*escape*_1_000000.vtu | wc -l)" = 1
 end
 

@@ -1,5 +1,5 @@
 #!/bin/sh
-# One volume with oblique axes as DICOM series, NIfTI, NRRD and MetaImage, written by pydicom, nibabel and dcm2niix: all
+# One volume with oblique axes as DICOM series, NIfTI, NRRD and MetaImage, written by pydicom, nibabel, dcm2niix and ITK: all
 # become the same body at the same place. Prints "N passed, N failed, N skipped"; exit 1 when a check failed.
 # usage: test_scans.sh PALPATE
 set -u
@@ -55,6 +55,21 @@ refused 1 'ct.nii: no voxel is within 500 to 3000'
 run prepare ct.nii -o none --threshold 3000,500
 refused 2 '--threshold: is not LOW,HIGH'
 end
+
+if command -v plastimatch >/dev/null 2>&1; then
+    begin "MetaImage of ITK, as 3D Slicer writes it, has the same body"
+    timeout 100 plastimatch convert --input ct.nii --output-img itk.mha --output-type short >err 2>&1
+    check "its axes are not oblique" grep -aq '^TransformMatrix = 0.9659.* -0.2588' itk.mha
+    becomes itk itk.mha
+    check "the body is elsewhere" nodes_equal nifti itk
+    # ITK reads what we hold for the specification
+    timeout 100 plastimatch convert --input ct.mha --output-img again.mha --output-type short >err 2>&1
+    becomes again again.mha
+    check "ITK reads our file otherwise" nodes_equal meta again
+    end
+else
+    skip "MetaImage of ITK has the same body" "plastimatch is not there"
+fi
 
 if command -v dcm2niix >/dev/null 2>&1; then
     begin "a DICOM series has the body of the same NIfTI, whatever the folder is called"

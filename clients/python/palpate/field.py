@@ -28,11 +28,8 @@ _HEAD_BYTES = 40
 
 
 @dataclass(frozen=True)
-class Field:
-    """Values at the vertices of a part.
-
-    level [n] uint8 in vertex order: 0 is low, 255 high, both in the field's unit.
-    """
+class Levels:
+    """One number for each place of a part at one moment: level [n] uint8, 0 is low, 255 high, both in the field's unit."""
 
     part: int
     name: str
@@ -46,6 +43,11 @@ class Field:
     def values(self) -> NDArray[np.float64]:
         """[n] in the field's unit, off by at most (high - low) / 510."""
         return self.low + (self.high - self.low) * self.level / 255.0
+
+
+@dataclass(frozen=True)
+class Field(Levels):
+    """Values at the vertices of a part, in vertex order."""
 
 
 def decode_field(data: bytes, n_vertex: int) -> Field:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from . import lz4, wire
 from .errors import need
-from .field import FIELD_NAMES
+from .field import FIELD_NAMES, Levels
 from .planes import U32
 
 _HEAD = struct.Struct("<IIQ fff II")
@@ -18,27 +18,14 @@ _Q_MAX = 1e30  # m: steps of it stay finite floats
 
 
 @dataclass(frozen=True)
-class Interior:
-    """Nodes inside a part at one moment, in the order of the interior's asset.
+class Interior(Levels):
+    """Values and displacements at the nodes inside a part, in the order of the interior's asset.
 
-    displacement_m [n][3] float32, at most q_m / 2 off in each coordinate; level [n] uint8: 0 is low, 255 high, both in
-    the field's unit.
+    displacement_m [n][3] float32, at most q_m / 2 off in each coordinate.
     """
 
-    part: int
-    name: str
-    epoch: int
-    sim_time_us: int
-    low: float
-    high: float
     q_m: float
     displacement_m: NDArray[np.float32]
-    level: NDArray[np.uint8]
-
-    @property
-    def values(self) -> NDArray[np.float64]:
-        """[n] in the field's unit, off by at most (high - low) / 510."""
-        return self.low + (self.high - self.low) * self.level / 255.0
 
 
 def decode_interior(data: bytes, n_node: int) -> Interior:
@@ -55,7 +42,7 @@ def decode_interior(data: bytes, n_node: int) -> Interior:
     differences = folded >> np.uint16(1) ^ (np.uint16(0) - (folded & np.uint16(1)))
     steps = np.cumsum(differences, axis=1, dtype=np.uint16).view(np.int16)
     move = (steps.T * np.float64(q)).astype(np.float32)
-    return Interior(part, FIELD_NAMES[number], epoch, sim_time_us, low, high, q, move, raw[6 * n :].copy())
+    return Interior(part, FIELD_NAMES[number], epoch, sim_time_us, low, high, raw[6 * n :].copy(), q, move)
 
 
 def tetrahedra_of(triangles: U32) -> U32:

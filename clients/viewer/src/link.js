@@ -213,9 +213,11 @@ export class Link {
                 socket.close(CLOSE_UNREADABLE, closeReason(error));
             }
         };
+        // what it means is told by the closing that follows; the package ws throws an error without a listener
+        socket.onerror = () => {};
         socket.onclose = (event) => {
             if (generation !== this.generation) return;
-            this.generation++;
+            const next = ++this.generation; // another one when the page closes or connects on what it is told below
             this.socket = null;
             if (this.leaves) return this.report("lost", textOf("link.moves"));
             const moves = this.env.now() - this.movedAt < MOVE_MS;
@@ -235,7 +237,6 @@ export class Link {
                     : textOf(moves ? "link.moves" : "link.lost"),
             );
             if (event.code === CLOSE_ELSEWHERE) this.env.post({ type: "elsewhere" });
-            const next = this.generation;
             this.env.later(() => next === this.generation && this.dial(), pause);
         };
     }

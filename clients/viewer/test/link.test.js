@@ -232,6 +232,19 @@ test("reconnects with growing pauses after a lost connection", () => {
     assert.equal(s.of("state").at(-1).state, "connecting");
 });
 
+test("who closes on being told of a lost connection is not connected again", () => {
+    const s = stand();
+    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee", ticket: "" });
+    const post = s.link.env.post;
+    s.link.env.post = (/** @type {any} */ message) => {
+        post(message);
+        if (message.state === "lost") s.link.close();
+    };
+    /** @type {any} */ (s.sockets[0]).onclose({ code: 1006, reason: "" });
+    s.waiting.forEach(({ call }) => call());
+    assert.equal(s.sockets.length, 1);
+});
+
 test("a server whose asset cannot be read is asked again ever more slowly", async () => {
     const s = stand();
     s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee", ticket: "" });

@@ -10,7 +10,7 @@
  * returned (tests/sim/effects/test_return.c) */
 #define PAL_SLEEP_ERROR_S 1e-4
 
-/* ---- refine (test_refine) ---- */
+/* ---- refine (test_refine, test_refine_criteria) ---- */
 
 /* of the mean edge of level 0. A body that moved by less, and whose loads are the same, is not evaluated again */
 #define STILL_EDGES 1e-4

@@ -1,6 +1,7 @@
-/* A series of VTU files and its PVD (ParaView Guide, "ParaView Data (PVD) File Format"). */
-#include "server/commands/vtu_series.h"
+/* A series of VTU or VTP files and its PVD (ParaView Guide, "ParaView Data (PVD) File Format"). */
+#include "server/commands/vtk_series.h"
 
+#include "server/commands/shown_moment.h"
 #include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/vtk_file.h"
 #include "server/scene/scene_file.h"
@@ -56,11 +57,19 @@ static int take_fields(const pal_world *world, const pal_body *b, double *value,
     return n_field;
 }
 
-static pal_err write_body(const pal_vtu_series *s, const char *file, const pal_world *world, const pal_body *b,
+static pal_err path_of(const pal_vtk_series *s, const char *file, char path[PATH], pal_diagnostic *diag)
+{
+    return snprintf(path, PATH, "%s/%s", s->folder, file) < PATH
+               ? PAL_ERR_OK
+               : PAL_REFUSE(diag, "%.80s...: the path is too long", s->folder);
+}
+
+static pal_err write_body(const pal_vtk_series *s, const char *file, const pal_world *world, const pal_body *b,
                           pal_diagnostic *diag)
 {
     char path[PATH];
     pal_vtk_field field[FIELDS];
+    PAL_TRY(path_of(s, file, path, diag));
     double *value = malloc((FIELDS + 2) * (size_t)b->n_node * sizeof *value);
     if (!value) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for %d nodes", file, b->n_node);
     const bool own = b->element != NULL;
@@ -72,22 +81,14 @@ static pal_err write_body(const pal_vtu_series *s, const char *file, const pal_w
                                .node = own ? b->element : b->tets->tet,
                                .n_point = take_fields(world, b, value, field),
                                .point = field};
-    pal_err err = snprintf(path, PATH, "%s/%s", s->folder, file) < PATH
-                      ? pal_mesh_write_vtu(path, &grid, diag)
-                      : PAL_REFUSE(diag, "%.80s...: the path is too long", s->folder);
+    const pal_err err = pal_mesh_write_vtu(path, &grid, diag);
     free(value);
     return err;
 }
 
-pal_err pal_vtu_series_step(pal_vtu_series *s, const pal_world *world, double now_s, pal_diagnostic *diag)
+static pal_err write_elements(pal_vtk_series *s, const pal_world *world, double now_s, pal_diagnostic *diag)
 {
     char name[PAL_NAME], file[PAL_NAME + 40];
-    /* a rounding of the sum of steps does not delay a moment by a step */
-    if (now_s < s->next_s - 1e-9) return PAL_ERR_OK;
-    if (s->n_moment == 0) PAL_TRY(pal_scene_make_folder(s->folder, diag));
-    if (!s->to && !(s->to = open_memstream(&s->list, &s->n_byte)))
-        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for its list", s->folder);
-    while (s->next_s <= now_s + 1e-9) s->next_s += s->period_s;
     for (int k = 0; k < pal_world_body_count(world); k++) {
         const pal_body *b = pal_world_view_body(world, k);
         if (!b->element && (!b->tets || b->tets->n_tet == 0)) continue;
@@ -98,17 +99,41 @@ pal_err pal_vtu_series_step(pal_vtu_series *s, const pal_world *world, double no
         fprintf(s->to, "<DataSet timestep=\"%.9g\" part=\"%d\" name=\"%s\" file=\"%s\"/>\n", now_s, k, name, file);
         s->n_file++;
     }
+    return PAL_ERR_OK;
+}
+
+static pal_err write_surfaces(pal_vtk_series *s, const pal_world *world, double now_s, pal_diagnostic *diag)
+{
+    char path[PATH], file[40];
+    snprintf(file, sizeof file, "surfaces_%06d.vtp", s->n_moment);
+    PAL_TRY(path_of(s, file, path, diag));
+    pal_shown_moment moment = {.vtp = path, .at_s = now_s};
+    PAL_TRY(pal_shown_moment_step(&moment, s->scene, world, now_s, diag));
+    fprintf(s->to, "<DataSet timestep=\"%.9g\" file=\"%s\"/>\n", now_s, file);
+    s->n_file++;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_vtk_series_step(pal_vtk_series *s, const pal_world *world, double now_s, pal_diagnostic *diag)
+{
+    /* a rounding of the sum of steps does not delay a moment by a step */
+    if (now_s < s->next_s - 1e-9) return PAL_ERR_OK;
+    if (s->n_moment == 0) PAL_TRY(pal_scene_make_folder(s->folder, diag));
+    if (!s->to && !(s->to = open_memstream(&s->list, &s->n_byte)))
+        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for its list", s->folder);
+    while (s->next_s <= now_s + 1e-9) s->next_s += s->period_s;
+    PAL_TRY((s->scene ? write_surfaces : write_elements)(s, world, now_s, diag));
     s->n_moment++;
     return PAL_ERR_OK;
 }
 
-pal_err pal_vtu_series_end(pal_vtu_series *s, pal_diagnostic *diag)
+pal_err pal_vtk_series_end(pal_vtk_series *s, pal_diagnostic *diag)
 {
     char path[PATH];
     pal_file_out out;
     if (s->n_file == 0) return PAL_REFUSE(diag, "--vtu: no body of the scene has elements of volume");
     if (fflush(s->to)) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for its list", s->folder);
-    snprintf(path, PATH, "%s/series.pvd", s->folder);
+    PAL_TRY(path_of(s, s->scene ? "surfaces.pvd" : "series.pvd", path, diag));
     PAL_TRY(pal_file_begin(&out, path, diag));
     fprintf(out.file,
             "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" "
@@ -117,7 +142,7 @@ pal_err pal_vtu_series_end(pal_vtu_series *s, pal_diagnostic *diag)
     return pal_file_end(&out, diag);
 }
 
-void pal_vtu_series_free(pal_vtu_series *s)
+void pal_vtk_series_free(pal_vtk_series *s)
 {
     if (s->to) fclose(s->to);
     free(s->list);
