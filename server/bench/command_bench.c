@@ -14,6 +14,7 @@ static const struct {
     {"adaptive", "", "surfaces that refine where they are touched: coarse, refined, adaptive", bench_adaptive},
     {"fem", "", "live steps and static solves of finite elements", bench_fem},
     {"organ", "[SURFACE.ply]", "finite-element organs of growing size by each preconditioner", bench_organ},
+    {"edit", "", "a live edit of the material of a part of a finite-element organ", bench_edit},
     {"solids", "", "subdivision solids as finite elements (paper A, Table 1)", bench_solids},
     {"calibrate", "[FOLDER]",
      "springs fitted to finite elements, by gradient and by annealing\n                      (FOLDER: deploy/problems)",

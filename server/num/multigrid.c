@@ -30,6 +30,7 @@ typedef struct matrix {
     int32_t *start, *column; /* full rows, columns ascending [n + 1] [start[n]] */
     vec4 (*value)[3];        /* blocks, column by column [start[n]] */
     float *inverse;          /* 1 / D, 0 at fixed nodes [n] */
+    uint8_t *stale;          /* rows that are made anew [n] */
     float lambda;            /* no eigenvalue of D^-1 A is larger */
     vec4 *x, *b, *r, *d, *e; /* answer, right side, residual, direction and the next one [n] */
 } matrix;
@@ -108,10 +109,11 @@ static pal_err make_level(const pal_grid_level *grid, pal_arena *arena, matrix *
     PAL_TRY(make_pattern(grid, arena, out));
     size_t n = (size_t)out->n;
     out->value = pal_arena_array(arena, (size_t)out->start[n], sizeof *out->value);
-    out->inverse = PAL_NEW(arena, float, n);
+    out->inverse = PAL_NEW(arena, float, n), out->stale = PAL_NEW(arena, uint8_t, n);
     out->x = PAL_NEW(arena, vec4, n), out->b = PAL_NEW(arena, vec4, n);
     out->r = PAL_NEW(arena, vec4, n), out->d = PAL_NEW(arena, vec4, n), out->e = PAL_NEW(arena, vec4, n);
-    return out->value && out->inverse && out->x && out->b && out->r && out->d && out->e ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    return out->value && out->inverse && out->stale && out->x && out->b && out->r && out->d && out->e ? PAL_ERR_OK
+                                                                                                      : PAL_ERR_MEMORY;
 }
 
 static pal_err make(pal_multigrid *mg)
@@ -171,9 +173,42 @@ static int find(const matrix *a, int i, int32_t j)
     return low;
 }
 
-void pal_multigrid_zero(pal_multigrid *mg)
+static void zero_row(matrix *a, int i)
 {
-    memset(mg->level[0].value, 0, sizeof *mg->level[0].value * (size_t)mg->level[0].start[mg->level[0].n]);
+    memset(a->value + a->start[i], 0, sizeof *a->value * (size_t)(a->start[i + 1] - a->start[i]));
+}
+
+/* the rows of a coarser level that have a part of a finer one's */
+static void mark_coarser(pal_multigrid *mg, int level)
+{
+    const pal_grid_level *grid = &mg->grid->level[level];
+    const uint8_t *finer = mg->level[level - 1].stale;
+    matrix *to = &mg->level[level];
+    for (int i = 0; i < to->n; i++) {
+        to->stale[i] = 0;
+        for (int32_t f = grid->begin[i]; f < grid->begin[i + 1] && !to->stale[i]; f++)
+            to->stale[i] = finer[grid->finer[f]];
+    }
+}
+
+void pal_multigrid_begin(pal_multigrid *mg, const uint8_t *changed)
+{
+    const pal_grid_level *grid = &mg->grid->level[0];
+    matrix *to = &mg->level[0];
+    memset(to->stale, 0, (size_t)to->n);
+    for (int k = 0; k < 8 * grid->n_cell; k++)
+        if (changed[k / 8]) to->stale[grid->node[k]] = 1;
+    for (int i = 0; i < to->n; i++)
+        if (to->stale[i]) zero_row(to, i);
+    for (int k = 1; k < mg->n_level; k++) mark_coarser(mg, k);
+}
+
+bool pal_multigrid_wants(const pal_multigrid *mg, int cell)
+{
+    const int32_t *node = mg->grid->level[0].node + 8 * (size_t)cell;
+    bool wanted = false;
+    for (int c = 0; c < 8; c++) wanted = wanted || mg->level[0].stale[node[c]];
+    return wanted;
 }
 
 void pal_multigrid_add_cell(pal_multigrid *mg, int cell, double k[24][24])
@@ -181,7 +216,7 @@ void pal_multigrid_add_cell(pal_multigrid *mg, int cell, double k[24][24])
     matrix *to = &mg->level[0];
     const int32_t *node = mg->grid->level[0].node + 8 * (size_t)cell;
     for (int c = 0; c < 8; c++)
-        for (int d = 0; d < 8; d++) {
+        for (int d = 0; d < 8 && to->stale[node[c]]; d++) {
             vec4 *block = to->value[find(to, node[c], node[d])];
             for (int j = 0; j < 3; j++)
                 for (int i = 0; i < 3; i++) block[j][i] += (float)k[3 * c + i][3 * d + j];
@@ -195,7 +230,7 @@ void pal_multigrid_add_mass(pal_multigrid *mg, int finest_node, double mass)
     const int32_t *from = grid->from + grid->start[finest_node];
     const int n = grid->start[finest_node + 1] - grid->start[finest_node];
     for (int c = 0; c < n; c++)
-        for (int d = 0; d < n; d++) {
+        for (int d = 0; d < n && to->stale[from[c]]; d++) {
             vec4 *block = to->value[find(to, from[c], from[d])];
             for (int i = 0; i < 3; i++) block[i][i] += (float)(mass / (n * n));
         }
@@ -206,14 +241,15 @@ static float weight(const pal_grid_level *grid, int32_t finer)
     return 1 / (float)(grid->start[finer + 1] - grid->start[finer]);
 }
 
-/* coarse = P' finer P, row by row */
+/* coarse = P' finer P, row by row, where a finer row is new */
 static void coarsen(pal_multigrid *mg, int level)
 {
     const matrix *from = &mg->level[level - 1];
     const pal_grid_level *grid = &mg->grid->level[level];
     matrix *to = &mg->level[level];
-    memset(to->value, 0, sizeof *to->value * (size_t)to->start[to->n]);
     for (int i = 0; i < to->n; i++) {
+        if (!to->stale[i]) continue;
+        zero_row(to, i);
         for (int32_t k = to->start[i]; k < to->start[i + 1]; k++) mg->place[to->column[k]] = k;
         for (int32_t f = grid->begin[i]; f < grid->begin[i + 1]; f++) {
             const int32_t finer = grid->finer[f];
@@ -368,9 +404,11 @@ static void apply(void *self, float scale)
 static void measure(matrix *a, const uint8_t *fixed)
 {
     for (int i = 0; i < a->n; i++) {
-        const vec4 *block = a->value[find(a, i, i)];
-        float d = (block[0][0] + block[1][1] + block[2][2]) / 3;
-        a->inverse[i] = !fixed[i] && d > 0 ? 1 / d : 0;
+        if (a->stale[i]) {
+            const vec4 *block = a->value[find(a, i, i)];
+            const float d = (block[0][0] + block[1][1] + block[2][2]) / 3;
+            a->inverse[i] = !fixed[i] && d > 0 ? 1 / d : 0;
+        }
         for (int c = 0; c < 3; c++) a->d[i][c] = a->inverse[i] > 0 ? pal_chebyshev_start(i, c) : 0;
     }
     a->lambda = pal_chebyshev_lambda(size_of_direction, apply, a);
@@ -426,33 +464,33 @@ const float *pal_multigrid_solve(pal_multigrid *mg, pal_cycle cycle, const float
 
 /* ---- cells ---- */
 
-/* weights of the corners of a cell at the corners of its part at `octant` */
-static void corner_weights(int octant, double w[8][8])
+/* weight of corner d of a cell at corner c of its part at `octant`; a power of 2, so that a product with it is exact */
+static double corner_weight(int octant, int c, int d)
 {
-    for (int c = 0; c < 8; c++)
-        for (int d = 0; d < 8; d++) {
-            w[c][d] = 1;
-            for (int axis = 0; axis < 3; axis++) {
-                double at = 0.5 * ((octant >> axis & 1) + (c >> axis & 1));
-                w[c][d] *= d >> axis & 1 ? at : 1 - at;
-            }
-        }
+    double w = 1;
+    for (int axis = 0; axis < 3; axis++) {
+        const double at = 0.5 * ((octant >> axis & 1) + (c >> axis & 1));
+        w *= d >> axis & 1 ? at : 1 - at;
+    }
+    return w;
 }
 
+/* P' (K P), with rows of 24 numbers side by side: K is symmetric, so that its rows are summed to those of (K P)' */
 void pal_multigrid_coarsen_cell(double k[24][24], int octant, unsigned fixed, double to[24][24])
 {
-    double w[8][8], part[24][24] = {{0}};
-    corner_weights(octant, w);
-    for (int c = 0; c < 8; c++)
-        for (int d = 0; d < 8; d++)
-            for (int e = 0; e < 8; e++) {
-                if (w[d][e] == 0 || fixed >> d & 1 || fixed >> c & 1) continue;
-                for (int i = 0; i < 3; i++)
-                    for (int j = 0; j < 3; j++) part[3 * c + i][3 * e + j] += k[3 * c + i][3 * d + j] * w[d][e];
-            }
+    double w[8][8], part[24][24], across[24][24] = {{0}};
+    for (int c = 0; c < 64; c++) w[c / 8][c % 8] = corner_weight(octant, c / 8, c % 8);
+    for (int d = 0; d < 8; d++)
+        for (int e = 0; e < 8; e++) {
+            if (w[d][e] == 0 || fixed >> d & 1) continue;
+            for (int j = 0; j < 3; j++)
+                for (int i = 0; i < 24; i++) across[3 * e + j][i] += k[3 * d + j][i] * w[d][e];
+        }
+    for (int i = 0; i < 24; i++)
+        for (int j = 0; j < 24; j++) part[i][j] = across[j][i];
     for (int c = 0; c < 8; c++)
         for (int d = 0; d < 8; d++) {
-            if (w[c][d] == 0) continue;
+            if (w[c][d] == 0 || fixed >> c & 1) continue;
             for (int i = 0; i < 3; i++)
                 for (int j = 0; j < 24; j++) to[3 * d + i][j] += w[c][d] * part[3 * c + i][j];
         }

@@ -11,6 +11,7 @@
 #define PAL_NUM_MULTIGRID_H
 #include "server/base/team.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -74,10 +75,18 @@ typedef struct pal_multigrid pal_multigrid;
 pal_err pal_multigrid_create(const pal_grid_hierarchy *grid, pal_multigrid **out);
 void pal_multigrid_destroy(pal_multigrid *mg); /* NULL is fine */
 
-/* new values: zero, then add the first level's matrix cell by cell and the lumped masses of the finest nodes, then
- * finish makes the coarser levels. NUMERIC: the coarsest matrix is not positive definite; MEMORY. No cycle may follow
- * then */
-void pal_multigrid_zero(pal_multigrid *mg);
+/* New values of the first level's cells that are marked in changed [n_cell], the first time and after an error all:
+ * begin, then add, in ascending order, the matrices of all cells that are wanted and the lumped masses of all finest
+ * nodes, then finish. Wanted are the marked cells and those that share a node with one; every row of the matrices that
+ * a marked cell has a part in is made anew, here and on the coarser levels, by the same sums as when all are marked, so
+ * that the result is the same to the bit. Whole are the largest eigenvalues of the smoothers and the factor of the
+ * coarsest level. NUMERIC: the coarsest matrix is not positive definite; MEMORY. No cycle may follow then.
+ *
+ * For cuts: a cell may become softer, or nothing (a matrix of zeros), as long as the coarsest matrix stays positive
+ * definite, which masses see to. A cut that gives a part of the mesh nodes of its own changes groups and nodes of the
+ * levels: that is another hierarchy, and a pal_multigrid made of it */
+void pal_multigrid_begin(pal_multigrid *mg, const uint8_t *changed);
+bool pal_multigrid_wants(const pal_multigrid *mg, int cell);
 void pal_multigrid_add_cell(pal_multigrid *mg, int cell, double k[24][24]);
 void pal_multigrid_add_mass(pal_multigrid *mg, int finest_node, double mass);
 pal_err pal_multigrid_finish(pal_multigrid *mg);
@@ -87,7 +96,7 @@ pal_err pal_multigrid_finish(pal_multigrid *mg);
  * solve. team: NULL, or threads that share the work; the same bits with any number */
 const float *pal_multigrid_solve(pal_multigrid *mg, pal_cycle cycle, const float *residual, pal_team *team);
 
-/* k [24][24], a matrix of a finer cell in corners and axes, interpolated from the corners of the cell that contains it
- * at `octant` and added to `to`; corners whose bits are set in `fixed` do not move */
+/* k [24][24], the symmetric matrix of a finer cell in corners and axes, interpolated from the corners of the cell that
+ * contains it at `octant` and added to `to`; corners whose bits are set in `fixed` do not move */
 void pal_multigrid_coarsen_cell(double k[24][24], int octant, unsigned fixed, double to[24][24]);
 #endif

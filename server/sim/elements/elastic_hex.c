@@ -8,10 +8,14 @@
 
 void pal_hex_material(pal_elastic_hexes *cubes, const pal_material *material)
 {
+    const double *was[2] = {cubes->recovery ? cubes->whole[0] : cubes->mu,
+                            cubes->recovery ? cubes->whole[1] : cubes->lambda};
+    cubes->n_edit++;
     for (int e = 0; e < cubes->n_hex; e++) {
         int lane = cubes->simd_blocks.place[e];
         double mu, lambda, scale = cubes->share[lane] * cubes->edge_m / 16;
         pal_elastic_regions_lame(&cubes->parts, material, e, &mu, &lambda);
+        if (was[0][lane] != scale * mu || was[1][lane] != scale * lambda) cubes->edited[e] = cubes->n_edit;
         cubes->mu[lane] = scale * mu;
         cubes->lambda[lane] = scale * lambda;
         /* the dilatation or a shear of modes, whose squares are 8 times those of corners */
@@ -49,6 +53,8 @@ static pal_err take_memory(pal_elastic_hexes *cubes, pal_arena *arena)
     if (!cubes->hex || !cubes->share || !cubes->mu || !cubes->lambda || !cubes->bound || !cubes->q ||
         !cubes->rotation || !cubes->reference)
         return PAL_ERR_MEMORY;
+    cubes->edited = PAL_NEW(arena, uint32_t, cubes->n_hex);
+    if (!cubes->edited) return PAL_ERR_MEMORY;
     if (!cubes->implicit) return PAL_ERR_OK;
     cubes->entry = PAL_NEW(arena, int32_t, 36 * (size_t)cubes->n_hex);
     if (!cubes->entry) return PAL_ERR_MEMORY;

@@ -51,6 +51,8 @@ typedef struct pal_elastic_hexes {
     double (*row)[8][2]; /* of cut elements: sums over the rows of the corners of |K| for mu = 1 and lambda = 1, times
                           * 16 / h [blocks that are cut * 8] */
     double *mu, *lambda; /* times share and h / 16, N/m                      [n_block][8]    */
+    uint32_t n_edit;     /* changes of the material since load, the first material among them */
+    uint32_t *edited;    /* the last of them that changed mu or lambda       [n_hex] */
     double *bound;       /* largest eigenvalue of a whole voxel's K times share, N/m [n_block][8] */
     double *q;           /* rotations as quaternions, warm start             [n_block][4][8] */
     double *rotation;    /* rotations at the last linearise                  [n_block][9][8] */

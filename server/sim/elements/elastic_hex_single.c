@@ -20,6 +20,15 @@ typedef pal_single8 single_wide;
 #define HEX_REAL   float
 #include "server/sim/elements/elastic_hex_modes.h"
 
+/* blocks of pairs of corners c <= d to a whole symmetric matrix */
+static void spread(double block[36][9], double to[24][24])
+{
+    for (int c = 0; c < 8; c++)
+        for (int d = c; d < 8; d++)
+            for (int i = 0; i < 9; i++)
+                to[3 * c + i / 3][3 * d + i % 3] = to[3 * d + i % 3][3 * c + i / 3] = block[pal_hex_pair(c, d)][i];
+}
+
 pal_err pal_hex_single_make(const pal_elastic_hexes *cubes, const pal_body *body, pal_arena *arena,
                             pal_elastic_hexes_single *out)
 {
@@ -32,7 +41,14 @@ pal_err pal_hex_single_make(const pal_elastic_hexes *cubes, const pal_body *body
     for (int b = 0; cubes->cut && b < cubes->n_block; b++) n_cut = cubes->cut[b] >= n_cut ? cubes->cut[b] + 1 : n_cut;
     if (n_cut > 0 && !(out->weight = PAL_NEW(arena, float, 8 * PAL_LANES * (size_t)n_cut))) return PAL_ERR_MEMORY;
     for (int i = 0; i < 8 * PAL_LANES * n_cut; i++) out->weight[i] = (float)cubes->weight[i];
-    return out->stiff && (out->rotation || cubes->law == PAL_LAW_LINEAR) ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    out->whole = pal_arena_array(arena, 2, sizeof *out->whole);
+    if (!out->whole || !out->stiff || !(out->rotation || cubes->law == PAL_LAW_LINEAR)) return PAL_ERR_MEMORY;
+    for (int part = 0; part < 2; part++) {
+        double block[36][9];
+        for (int i = 0; i < 36 * 9; i++) block[i / 9][i % 9] = cubes->reference[i / 9][part][i % 9];
+        spread(block, out->whole[part]);
+    }
+    return PAL_ERR_OK;
 }
 
 static const double *coefficients(const pal_elastic_hexes *cubes, int part)
@@ -241,21 +257,41 @@ static void turn_block(const double r[9], const double k[9], double to[9])
                 part[i - i % 3 + 2] * r[3 * (i % 3) + 2];
 }
 
+/* the rotation of a lane; false: none that single precision sees */
+static bool read_rotation(const float *rotation, int lane, double r[9])
+{
+    for (int i = 0; i < 9; i++) r[i] = (double)rotation[(9 * (lane / PAL_LANES) + i) * PAL_LANES + lane % PAL_LANES];
+    return r[0] + r[4] + r[8] < 3;
+}
+
+bool pal_hex_single_rests(const pal_elastic_hexes_single *single)
+{
+    bool turned = false;
+    double r[9];
+    for (int e = 0; e < single->cubes->n_hex && single->rotation && !turned; e++)
+        turned = read_rotation(single->rotation, single->cubes->simd_blocks.place[e], r);
+    return !turned;
+}
+
 void pal_hex_single_element(const pal_elastic_hexes_single *single, const float *rotation, int e, double k,
                             double to[24][24])
 {
-    const int place = single->cubes->simd_blocks.place[e], block = place / PAL_LANES, lane = place % PAL_LANES;
-    const float *stiff = single->stiff + 2 * PAL_LANES * block + lane;
-    double r[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, part[36][9], trace;
-    pal_hex_matrix(single->cubes, place, (double)stiff[0], (double)stiff[PAL_LANES], part);
-    for (int i = 0; i < 9 && rotation; i++) r[i] = (double)rotation[(9 * block + i) * PAL_LANES + lane];
-    trace = r[0] + r[4] + r[8];
-    for (int c = 0; c < 8; c++)
-        for (int d = c; d < 8; d++) {
-            double *a = part[pal_hex_pair(c, d)];
-            for (int i = 0; i < 9; i++) a[i] *= k;
-            if (trace < 3) turn_block(r, a, a);
-            for (int i = 0; i < 9; i++) to[3 * c + i / 3][3 * d + i % 3] = to[3 * d + i % 3][3 * c + i / 3] = a[i];
+    const int place = single->cubes->simd_blocks.place[e], block = place / PAL_LANES;
+    const float *stiff = single->stiff + 2 * PAL_LANES * block + place % PAL_LANES;
+    const double mu = (double)stiff[0], lambda = (double)stiff[PAL_LANES];
+    double r[9];
+    const bool turned = rotation && read_rotation(rotation, place, r);
+    if (turned || pal_hex_is_cut(single->cubes, block)) {
+        double part[36][9];
+        pal_hex_matrix(single->cubes, place, mu, lambda, part);
+        for (int p = 0; p < 36; p++) {
+            for (int i = 0; i < 9; i++) part[p][i] *= k;
+            if (turned) turn_block(r, part[p], part[p]);
         }
+        spread(part, to);
+    } else {
+        for (int i = 0; i < 24; i++)
+            for (int j = 0; j < 24; j++) to[i][j] = (mu * single->whole[0][i][j] + lambda * single->whole[1][i][j]) * k;
+    }
     pal_hex_ground_block(single->cubes, e, k, to);
 }

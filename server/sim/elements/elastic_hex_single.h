@@ -9,8 +9,9 @@
 typedef struct pal_elastic_hexes_single {
     const pal_elastic_hexes *cubes;
     int n_slot;
-    const int32_t *slot; /* of the body's nodes [n_node] */
-    float *stiff;        /* mu, lambda times h / 16, N/m                   [n_block][2][8] */
+    double (*whole)[24][24]; /* K of a whole voxel at rest, for mu = 1 and for lambda = 1, h / 16 [2] */
+    const int32_t *slot;     /* of the body's nodes [n_node] */
+    float *stiff;            /* mu, lambda times h / 16, N/m                   [n_block][2][8] */
     float *weight;   /* as in cubes: of blocks with a cut element [blocks that are cut][8][8]; NULL: there are none */
     float *rotation; /* [n_block][9][8]; NULL: the law is linear */
 } pal_elastic_hexes_single;
@@ -22,6 +23,8 @@ pal_err pal_hex_single_make(const pal_elastic_hexes *cubes, const pal_body *body
 void pal_hex_single_stiffen(pal_elastic_hexes_single *single);
 /* takes the rotations of the last linearise. team: NULL, or threads that share the work */
 void pal_hex_single_rotate(pal_elastic_hexes_single *single, pal_team *team);
+/* no element has turned: pal_hex_single_element gives the matrices of rest */
+bool pal_hex_single_rests(const pal_elastic_hexes_single *single);
 /* out += k K p; empty slots of p are 0. team: NULL, or threads that share the work; the same bits with any number */
 void pal_hex_single_multiply(const pal_elastic_hexes_single *single, pal_team *team, float k, const float *p,
                              float *out);

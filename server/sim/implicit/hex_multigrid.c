@@ -73,7 +73,11 @@ pal_err pal_hex_levels_make(const pal_body *body, const pal_elastic_hexes *cubes
     out->x = PAL_NEW(arena, float, 3 * n), out->b = PAL_NEW(arena, float, 3 * n), out->d = PAL_NEW(arena, float, 3 * n);
     out->r = PAL_NEW(arena, float, 3 * n), out->q = PAL_NEW(arena, float, 3 * n);
     out->part = PAL_NEW(arena, float, 4 * (size_t)body->n_node);
-    return out->x && out->b && out->d && out->r && out->q && out->part ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    out->changed_cell = PAL_NEW(arena, uint8_t, out->grid.level[0].n_cell);
+    out->changed_node = PAL_NEW(arena, uint8_t, body->n_node);
+    return out->x && out->b && out->d && out->r && out->q && out->part && out->changed_cell && out->changed_node
+               ? PAL_ERR_OK
+               : PAL_ERR_MEMORY;
 }
 
 pal_err pal_hex_multigrid_make(pal_hex_levels *levels, pal_arena *arena, pal_hex_multigrid *out)
@@ -327,14 +331,38 @@ void pal_hex_multigrid_solve(pal_hex_multigrid *mg, pal_cycle cycle, const pal_w
 
 /* ---- values ---- */
 
+static void mark_all(const pal_hex_levels *levels)
+{
+    memset(levels->changed_cell, 1, (size_t)levels->grid.level[0].n_cell);
+    memset(levels->changed_node, 1, (size_t)levels->body->n_node);
+}
+
+/* cells with an element that has been edited since, and the nodes of such elements; returns their number */
+static int mark_edited(const pal_hex_levels *levels, uint32_t n_edit)
+{
+    const pal_grid_level *grid = &levels->grid.level[0];
+    int n = 0;
+    memset(levels->changed_cell, 0, (size_t)grid->n_cell);
+    memset(levels->changed_node, 0, (size_t)levels->body->n_node);
+    for (int g = 0; g < grid->n_cell; g++)
+        for (int32_t m = grid->first[g]; m < grid->first[g + 1]; m++) {
+            const int32_t e = grid->child[m], *node = levels->body->hexes->node + 8 * (size_t)e;
+            if (levels->cubes->edited[e] <= n_edit) continue;
+            levels->changed_cell[g] = 1, n++;
+            for (int c = 0; c < 8; c++) levels->changed_node[node[c]] = 1;
+        }
+    return n;
+}
+
 /* values of the coarser levels, of the rotations given */
 static pal_err fill_levels(const pal_hex_levels *levels, const float *rotation, pal_hex_values *to)
 {
     const pal_grid_level *grid = &levels->grid.level[0];
     const pal_body *body = levels->body;
-    pal_multigrid_zero(to->coarse);
+    pal_multigrid_begin(to->coarse, levels->changed_cell);
     for (int g = 0; g < grid->n_cell; g++) {
         double sum[24][24] = {{0}}, k[24][24];
+        if (!pal_multigrid_wants(to->coarse, g)) continue;
         for (int32_t m = grid->first[g]; m < grid->first[g + 1]; m++) {
             const int e = grid->child[m];
             unsigned fixed = 0;
@@ -347,30 +375,46 @@ static pal_err fill_levels(const pal_hex_levels *levels, const float *rotation, 
     for (int i = 0; i < body->n_node; i++)
         pal_multigrid_add_mass(to->coarse, i, (double)to->weight[body->node_order->slot[i]]);
     PAL_TRY(pal_multigrid_finish(to->coarse));
-    return pal_stiff_nodes_update(&to->stiff_nodes, body, &levels->single, rotation, to->weight, to->stiff);
+    return pal_stiff_nodes_update(&to->stiff_nodes, body, &levels->single, rotation, to->weight, to->stiff,
+                                  levels->changed_node);
 }
 
-/* masses of the finest level, which an edit may change while a spare thread makes the rest */
-static void fill_weights(const pal_hex_levels *levels, pal_hex_values *to)
+/* masses of the finest level, which an edit may change while a spare thread makes the rest; true: they are others */
+static bool fill_weights(const pal_hex_levels *levels, pal_hex_values *to)
 {
     const pal_body *body = levels->body;
-    for (int i = 0; i < body->n_node; i++) to->weight[body->node_order->slot[i]] = (float)(to->mass * body->mass_kg[i]);
+    bool others = false;
+    for (int i = 0; i < body->n_node; i++) {
+        float *weight = &to->weight[body->node_order->slot[i]];
+        const float now = (float)(to->mass * body->mass_kg[i]);
+        others = others || *weight != now;
+        *weight = now;
+    }
+    return others;
 }
 
-/* D of the finest level */
+/* D of the finest level at the nodes that are marked */
 static void fill_diagonal(const pal_hex_levels *levels, pal_hex_values *to)
 {
+    const uint8_t *node = levels->changed_node;
     const pal_body *body = levels->body;
     const pal_hexes *hexes = body->hexes;
     const int32_t *slot = body->node_order->slot;
-    double k[24][24];
-    memset(to->inverse, 0, sizeof *to->inverse * (size_t)levels->n_slot);
+    for (int i = 0; i < body->n_node; i++)
+        if (node[i]) to->inverse[slot[i]] = 0;
     for (int e = 0; e < hexes->n_hex; e++) {
-        pal_hex_single_element(&levels->single, NULL, e, to->stiff, k);
-        for (int c = 0; c < 24; c += 3)
-            to->inverse[slot[hexes->node[8 * e + c / 3]]] += (float)((k[c][c] + k[c + 1][c + 1] + k[c + 2][c + 2]) / 3);
+        const int32_t *corner = hexes->node + 8 * (size_t)e;
+        double k[24][24];
+        bool marked = false;
+        for (int c = 0; c < 8; c++) marked = marked || node[corner[c]];
+        if (marked) pal_hex_single_element(&levels->single, NULL, e, to->stiff, k);
+        for (int c = 0; c < 8 && marked; c++)
+            if (node[corner[c]])
+                to->inverse[slot[corner[c]]] +=
+                    (float)((k[3 * c][3 * c] + k[3 * c + 1][3 * c + 1] + k[3 * c + 2][3 * c + 2]) / 3);
     }
     for (int i = 0; i < body->n_node; i++) {
+        if (!node[i]) continue;
         float *inverse = &to->inverse[slot[i]];
         const float weight = to->weight[slot[i]];
         *inverse = !body->support[i] && *inverse + weight > 0 ? 1 / (*inverse + weight) : 0;
@@ -423,14 +467,24 @@ void pal_hex_multigrid_rotate(pal_hex_multigrid *mg)
 
 pal_err pal_hex_multigrid_update(pal_hex_multigrid *mg, double mass, double stiff)
 {
+    pal_hex_levels *levels = mg->levels;
+    pal_hex_values *now = &mg->now;
     pal_spare_thread_wait(&mg->spare_thread);
-    mg->now.mass = mass, mg->now.stiff = stiff;
-    pal_hex_single_stiffen(&mg->levels->single);
-    pal_hex_single_rotate(&mg->levels->single, mg->levels->body->team);
-    fill_weights(mg->levels, &mg->now);
-    fill_diagonal(mg->levels, &mg->now);
+    pal_hex_single_stiffen(&levels->single);
+    pal_hex_single_rotate(&levels->single, levels->body->team);
+    const bool rest = pal_hex_single_rests(&levels->single),
+               same = now->mass == mass && now->stiff == stiff && now->rest && rest;
+    now->mass = mass, now->stiff = stiff;
+    if (fill_weights(levels, now) || !same)
+        mark_all(levels);
+    else if (mark_edited(levels, now->n_edit) == 0)
+        return PAL_ERR_OK;
+    now->n_edit = levels->cubes->n_edit;
+    fill_diagonal(levels, now);
     find_lambda(mg);
-    return fill_levels(mg->levels, mg->levels->single.rotation, &mg->now);
+    pal_err err = fill_levels(levels, levels->single.rotation, now);
+    now->rest = rest && !err;
+    return err;
 }
 
 static void make_next(void *self)
@@ -439,6 +493,8 @@ static void make_next(void *self)
     pal_hex_values *next = &mg->next;
     mg->outcome = next->coarse ? PAL_ERR_OK : pal_multigrid_create(&mg->levels->grid, &next->coarse);
     if (mg->outcome) return;
+    next->rest = false;
+    mark_all(mg->levels);
     fill_diagonal(mg->levels, next);
     mg->outcome = fill_levels(mg->levels, mg->turned, next);
 }
@@ -447,7 +503,7 @@ pal_err pal_hex_multigrid_refresh(pal_hex_multigrid *mg, double mass, double sti
 {
     const pal_elastic_hexes *cubes = mg->levels->cubes;
     mg->next.mass = mass, mg->next.stiff = stiff;
-    fill_weights(mg->levels, &mg->next);
+    (void)fill_weights(mg->levels, &mg->next);
     for (int i = 0; i < 9 * PAL_LANES * cubes->n_block && mg->turned; i++) mg->turned[i] = (float)cubes->rotation[i];
     return pal_spare_thread_run(&mg->spare_thread, make_next, mg);
 }

@@ -4,7 +4,17 @@
  * the smoother and the coarser levels). The coarser levels are those of the state at the last update or refresh, warped
  * to the present one (warp.h): z = W P A1^-1 P' W' r. The number of iterations of conjugate gradients does not grow
  * with the number of nodes: 10 or 11 to 1e-6 (tests/sim/implicit/test_preconditioner.c). Strong contrasts of stiffness
- * have a factor of their own (stiff_nodes.h). Memory: the caller's arena, and the heap for the coarser levels, in make
+ * have a factor of their own (stiff_nodes.h).
+ *
+ * An update makes anew what has a part of an element whose material has been edited since the last one
+ * (pal_elastic_hexes.edited): diagonal entries at its nodes, the coarse cell that contains it and what is above that
+ * one (num/multigrid.h); the factor of the stiff nodes only where one of them is a node of it. Whole are the largest
+ * eigenvalues and the coarsest level's factor, a third of the time of all (palpate bench edit). The bits are those of
+ * levels made as a whole. All elements count as edited where the coefficients of M and K are others, masses have
+ * changed, and where the body or the levels in use are not at rest. An element may be edited to any stiffness, nothing
+ * too; a cut that severs nodes is another mesh and wants other levels.
+ *
+ * Memory: the caller's arena, and the heap for the coarser levels, in make
  * and in the first refresh; the factors of the coarsest level and of stiff nodes use it in every update. Thread: [load]
  * to make, then [sim]. */
 #ifndef PAL_SIM_IMPLICIT_HEX_MULTIGRID_H
@@ -24,11 +34,16 @@ typedef struct pal_hex_levels {
     int32_t *group;           /* first slot [n_group] */
     float *x, *b, *d, *r, *q; /* answer, right side, direction, residual, product [3][n_slot] */
     float *part;              /* of residuals at nodes, x y z 0 [n_node][4] */
+    /* what an update makes anew: first level's cells with an edited element, nodes of such elements [n_cell] [n_node]
+     */
+    uint8_t *changed_cell, *changed_node;
 } pal_hex_levels;
 
 /* what the levels hold of one A */
 typedef struct pal_hex_values {
     double mass, stiff;      /* factors of M and K in A */
+    bool rest;               /* of the body at rest, and whole */
+    uint32_t n_edit;         /* of the material, when they were made */
     float lambda;            /* no eigenvalue of D^-1 A is larger */
     float *weight, *inverse; /* mass M; 1 / D, 0 at fixed nodes and empty slots [n_slot] */
     pal_multigrid *coarse;   /* of the next values: NULL before the first refresh */
@@ -48,8 +63,8 @@ pal_err pal_hex_levels_make(const pal_body *body, const pal_elastic_hexes *cubes
                             pal_hex_levels *out);
 pal_err pal_hex_multigrid_make(pal_hex_levels *levels, pal_arena *arena, pal_hex_multigrid *out);
 void pal_hex_multigrid_destroy(pal_hex_multigrid *mg);
-/* takes material and rotations of the last linearise. NUMERIC: not positive definite; MEMORY. No solve may follow an
- * error */
+/* takes material and rotations of the last linearise, where they are others than at the last update. NUMERIC: not
+ * positive definite; MEMORY. No solve may follow an error */
 pal_err pal_hex_multigrid_update(pal_hex_multigrid *mg, double mass, double stiff);
 /* starts levels of the rotations of the last linearise on a spare thread. MEMORY */
 pal_err pal_hex_multigrid_refresh(pal_hex_multigrid *mg, double mass, double stiff);

@@ -55,6 +55,13 @@ static bool is_same(const pal_stiff_nodes *s, const uint8_t *stiff, int n)
     return same;
 }
 
+static bool has_changed(const pal_stiff_nodes *s, const uint8_t *changed)
+{
+    bool has = false;
+    for (int k = 0; k < s->n && !has; k++) has = changed[s->node[k]];
+    return has;
+}
+
 /* ---- pattern ---- */
 
 static int stiff_corners(const pal_stiff_nodes *s, const int32_t *node, int32_t *to)
@@ -134,19 +141,20 @@ static void fill(pal_stiff_nodes *s, const pal_body *body, const pal_elastic_hex
 }
 
 pal_err pal_stiff_nodes_update(pal_stiff_nodes *s, const pal_body *body, const pal_elastic_hexes_single *single,
-                               const float *rotation, const float *weight, double stiff)
+                               const float *rotation, const float *weight, double stiff, const uint8_t *changed)
 {
     uint8_t *marked;
     pal_err err = PAL_ERR_OK;
     PAL_ARRAY(&err, marked, (size_t)body->n_node);
     if (err) return err;
     const int n = mark(body, single, marked);
-    if (!is_same(s, marked, n)) {
+    const bool same = is_same(s, marked, n);
+    if (!same) {
         pal_stiff_nodes_destroy(s);
         if (n > 0) err = make(s, body, marked, n);
     }
     free(marked);
-    if (!err && n > 0) {
+    if (!err && n > 0 && (!same || has_changed(s, changed))) {
         fill(s, body, single, rotation, weight, stiff);
         err = pal_cholesky_factor(s->factor, &s->blocks, true);
     }

@@ -21,9 +21,11 @@ typedef struct pal_stiff_nodes {
 } pal_stiff_nodes;
 
 /* finds the nodes for the material in `single`, and makes the factor: A = diag(weight) + stiff K at `rotation`
- * (elastic_hex_single.h); weight by slot. The pattern is kept while the nodes are the same. MEMORY, NUMERIC: n is 0 */
+ * (elastic_hex_single.h); weight by slot. The pattern is kept while the nodes are the same, the factor too while none
+ * of them is in changed [n_node], the nodes of elements that are others than at the last update. MEMORY, NUMERIC: n is
+ * 0 */
 pal_err pal_stiff_nodes_update(pal_stiff_nodes *s, const pal_body *body, const pal_elastic_hexes_single *single,
-                               const float *rotation, const float *weight, double stiff);
+                               const float *rotation, const float *weight, double stiff, const uint8_t *changed);
 void pal_stiff_nodes_destroy(pal_stiff_nodes *s);
 /* x += W S' (S A S')^-1 S W' (b - q); b, q, x by slot [3][n_slot] */
 void pal_stiff_nodes_correct(pal_stiff_nodes *s, const pal_body *body, const pal_warp *warp, int n_slot, const float *b,

@@ -428,41 +428,64 @@ static void check_cycles(pal_preconditioner *p, double *work, int turn)
     }
 }
 
-static void check_applications(bool stiff)
-{
-    fem_beam b;
-    REQUIRE(open_large(&b, false, stiff, 1));
-    /* the solver of the world has its own; this one is made beside it, of the same component */
-    pal_arena *arena = pal_arena_create(1 << 20, true);
-    const pal_component *elastic = NULL;
-    for (int i = 0; i < pal_world_component_count(b.world); i++)
-        if (!strcmp(pal_world_component(b.world, i)->effect->name, "hex_elastic"))
-            elastic = pal_world_component(b.world, i);
-    REQUIRE(arena && elastic);
-    const pal_build build = {
-        .scene = b.scene, .def = b.def, .body = b.body, .arena = arena, .diag = &diag, .made = elastic, .n_made = 1};
+/* A multigrid preconditioner beside that of the world's solver, of the same component */
+typedef struct beside {
+    pal_arena *arena;
     pal_system system;
     pal_node_rotations rotations;
     pal_preconditioner p;
-    REQUIRE(!pal_system_make(&build, &system));
-    REQUIRE(!pal_node_rotations_make(&system, arena, &rotations));
+    pal_elastic_hexes *cubes;
+} beside;
+
+static void beside_make(beside *o, const fem_beam *b)
+{
+    const pal_component *elastic = NULL;
+    for (int i = 0; i < pal_world_component_count(b->world); i++)
+        if (!strcmp(pal_world_component(b->world, i)->effect->name, "hex_elastic"))
+            elastic = pal_world_component(b->world, i);
+    o->arena = pal_arena_create(1 << 20, true);
+    REQUIRE(o->arena && elastic);
+    o->cubes = elastic->self;
+    const pal_build build = {.scene = b->scene,
+                             .def = b->def,
+                             .body = b->body,
+                             .arena = o->arena,
+                             .diag = &diag,
+                             .made = elastic,
+                             .n_made = 1};
+    REQUIRE(!pal_system_make(&build, &o->system));
+    REQUIRE(!pal_node_rotations_make(&o->system, o->arena, &o->rotations));
     const pal_preconditioner_options options = {.kind = PAL_PRECONDITION_MULTIGRID};
-    REQUIRE(!pal_preconditioner_make(&options, &system, &rotations, arena, &diag, &p));
+    REQUIRE(!pal_preconditioner_make(&options, &o->system, &o->rotations, o->arena, &diag, &o->p));
+}
+
+static void beside_free(beside *o)
+{
+    pal_preconditioner_destroy(&o->p);
+    pal_arena_destroy(o->arena);
+}
+
+static void check_applications(bool stiff)
+{
+    fem_beam b;
+    beside o;
+    REQUIRE(open_large(&b, false, stiff, 1));
+    beside_make(&o, &b);
     const size_t n = 3 * (size_t)b.body->n_node;
     double *r = calloc(4 * n, sizeof *r), *s = r + n, *z = s + n, *q = z + n;
     REQUIRE(r != NULL);
     for (int turn = 0; turn < 2; turn++) { /* at rest, and twisted since the levels were made */
-        system.mass = 1, system.stiff = 1.0 / 3600;
-        pal_system_linearise(&system);
-        pal_node_rotations_update(&rotations, &system);
-        if (turn == 0) REQUIRE(!pal_preconditioner_update(&p));
-        pal_preconditioner_rotate(&p);
+        o.system.mass = 1, o.system.stiff = 1.0 / 3600;
+        pal_system_linearise(&o.system);
+        pal_node_rotations_update(&o.rotations, &o.system);
+        if (turn == 0) REQUIRE(!pal_preconditioner_update(&o.p));
+        pal_preconditioner_rotate(&o.p);
         uint64_t seed = 5;
         double rz, sq, rq, sz, rr = 0;
         for (int trial = 0; trial < 3; trial++) {
             for (size_t i = 0; i < n; i++) r[i] = random_signed(&seed), s[i] = random_signed(&seed);
             pal_system_clear_supported(b.body, r), pal_system_clear_supported(b.body, s);
-            pal_preconditioner_solve(&p, PAL_CYCLE_V, r, z), pal_preconditioner_solve(&p, PAL_CYCLE_V, s, q);
+            pal_preconditioner_solve(&o.p, PAL_CYCLE_V, r, z), pal_preconditioner_solve(&o.p, PAL_CYCLE_V, s, q);
             rz = sq = rq = sz = 0;
             for (size_t i = 0; i < n; i++) rz += r[i] * z[i], sq += s[i] * q[i], rq += r[i] * q[i], sz += s[i] * z[i];
             CHECK(rz > 0 && sq > 0);
@@ -471,15 +494,153 @@ static void check_applications(bool stiff)
             rr = fmax(rr, fabs(rq - sz) / sqrt(rz * sq));
         }
         printf("  asymmetry %.1e\n", rr);
-        if (!stiff) check_cycles(&p, r, turn);
+        if (!stiff) check_cycles(&o.p, r, turn);
         for (int i = 0; i < b.body->n_node; i++) {
             double *x = b.body->x + 3 * i, a = 3 * x[0], y = x[1] - 0.025, w = x[2] - 0.025;
             x[1] = 0.025 + cos(a) * y - sin(a) * w, x[2] = 0.025 + sin(a) * y + cos(a) * w;
         }
     }
     free(r);
-    pal_preconditioner_destroy(&p);
-    pal_arena_destroy(arena);
+    beside_free(&o);
+    beam_free(&b);
+}
+
+/* multiplies the stiffness of an element, as an edit of its material does */
+static void scale_element(pal_elastic_hexes *cubes, int e, double times)
+{
+    const int lane = cubes->simd_blocks.place[e];
+    cubes->mu[lane] *= times, cubes->lambda[lane] *= times;
+    for (int part = 0; part < 2 && cubes->recovery; part++) cubes->whole[part][lane] *= times;
+    cubes->edited[e] = cubes->n_edit;
+}
+
+/* edits some n elements of the body, near one another or scattered, by factors; returns how many */
+static int edit_elements(const fem_beam *b, pal_elastic_hexes *cubes, int n, bool near, double times, uint64_t *seed)
+{
+    const int middle = (int)(0.5 * (1 + random_signed(seed)) * (cubes->n_hex - 1));
+    const double *at = b->body->x_rest + 3 * cubes->hexes->node[8 * middle];
+    const double radius = cbrt(n * 3 / (4 * M_PI)) * cubes->edge_m;
+    int count = 0;
+    cubes->n_edit++;
+    for (int e = 0; e < cubes->n_hex; e++) {
+        const bool in = near ? pal_dist3(b->body->x_rest + 3 * cubes->hexes->node[8 * e], at) <= radius
+                             : random_signed(seed) < 2.0 * n / cubes->n_hex - 1;
+        if (in) scale_element(cubes, e, times * (1.5 + 0.5 * random_signed(seed))), count++;
+    }
+    return count;
+}
+
+/* both apply the same, bit for bit */
+static bool same_bits(beside *a, beside *o, const fem_beam *b, uint64_t *seed)
+{
+    const size_t n = 3 * (size_t)b->body->n_node;
+    double *r = calloc(3 * n, sizeof *r), *y = r + n, *z = y + n;
+    if (!r) return false;
+    for (size_t i = 0; i < n; i++) r[i] = random_signed(seed);
+    pal_system_clear_supported(b->body, r);
+    pal_preconditioner_rotate(&a->p), pal_preconditioner_solve(&a->p, PAL_CYCLE_V, r, y);
+    pal_preconditioner_rotate(&o->p), pal_preconditioner_solve(&o->p, PAL_CYCLE_V, r, z);
+    double size = 0;
+    for (size_t i = 0; i < n; i++) size += y[i] * y[i];
+    const bool same = memcmp(y, z, n * sizeof *y) == 0 && size > 0;
+    free(r);
+    return same;
+}
+
+static void coefficients(beside *o, double mass, double stiff)
+{
+    o->system.mass = mass, o->system.stiff = stiff;
+    pal_system_linearise_rest(&o->system);
+}
+
+/* cells of the first coarser level that the last update made anew, over all */
+static double share_made(const beside *o)
+{
+    const pal_hex_multigrid *mg = &o->p.multigrid;
+    const int n_cell = mg->levels->grid.level[0].n_cell;
+    int n = 0;
+    for (int g = 0; g < n_cell; g++) n += pal_multigrid_wants(mg->now.coarse, g);
+    return (double)n / n_cell;
+}
+
+/* Random sets of elements are edited, softer, stiffer than any other, to nothing and back; after each edit levels that
+ * are updated are those that are made as a whole. With masses, and of the stiffness alone */
+static void an_update_is_that_of_the_whole_body_to_the_bit(void)
+{
+    static const struct {
+        int n;
+        bool near;
+        double times;
+    } edit[] = {{1, true, 0.5}, {60, true, 3}, {40, false, 0.8}, {30, true, 80}, {6, false, 2}, {30, true, 0.01}};
+    for (int shape = 0; shape < 4; shape++) {
+        fem_beam b;
+        beside part;
+        uint64_t seed = 11 + (uint64_t)shape;
+        const bool irregular = shape % 2;
+        int n_factored = 0;
+        REQUIRE(open_large(&b, irregular, true, 1));
+        beside_make(&part, &b);
+        const double mass = shape < 2 ? 1 : 0, stiff = shape < 2 ? 1.0 / 3600 : 1;
+        coefficients(&part, mass, stiff);
+        REQUIRE(!pal_preconditioner_update(&part.p));
+        CHECK_NEAR(share_made(&part), 1, 0);
+        for (int k = 0; k < 6; k++) {
+            const int n = edit_elements(&b, part.cubes, edit[k].n, edit[k].near, edit[k].times, &seed);
+            beside whole;
+            beside_make(&whole, &b);
+            coefficients(&part, mass, stiff), coefficients(&whole, mass, stiff);
+            REQUIRE(!pal_preconditioner_update(&part.p) && !pal_preconditioner_update(&whole.p));
+            CHECK(same_bits(&part, &whole, &b, &seed));
+            /* an element has a part in 27 coarse cells at most */
+            CHECK_LE(share_made(&part) * part.p.levels->grid.level[0].n_cell, 27.0 * n);
+            if (edit[k].near) CHECK_LE(share_made(&part), 0.2);
+            CHECK_NEAR(share_made(&whole), 1, 0);
+            n_factored += part.p.multigrid.now.stiff_nodes.n > 0;
+            printf("  %d nodes, %d of them stiff: %d elements edited, %.1f %% of the coarse cells made\n",
+                   b.body->n_node, part.p.multigrid.now.stiff_nodes.n, n, 100 * share_made(&part));
+            beside_free(&whole);
+        }
+        CHECK_LE(2, n_factored);
+        beside_free(&part);
+        if (irregular)
+            ellipsoid_free(&b);
+        else
+            beam_free(&b);
+    }
+}
+
+/* what makes all levels anew: other coefficients, other masses, an update that failed; and that elements may be edited
+ * to nothing where masses hold the matrix */
+static void an_update_takes_all_that_has_changed(void)
+{
+    fem_beam b;
+    beside part, whole;
+    uint64_t seed = 3;
+    REQUIRE(open_large(&b, false, true, 1));
+    beside_make(&part, &b), beside_make(&whole, &b);
+    coefficients(&part, 1, 1.0 / 3600);
+    REQUIRE(!pal_preconditioner_update(&part.p));
+    for (int k = 0; k < 5; k++) {
+        double mass = 1, stiff = 1.0 / 3600;
+        if (k == 0) stiff = 1.0 / 14400;
+        if (k == 1) mass = 1.1;
+        if (k == 2) b.body->mass_kg[b.body->n_node / 2] *= 1.5;
+        if (k == 3) { /* not positive definite, then what it was */
+            part.cubes->n_edit++;
+            for (int e = 0; e < part.cubes->n_hex; e++) scale_element(part.cubes, e, -1);
+            coefficients(&part, 0, 1);
+            CHECK_INT(pal_preconditioner_update(&part.p), PAL_ERR_NUMERIC);
+            part.cubes->n_edit++;
+            for (int e = 0; e < part.cubes->n_hex; e++) scale_element(part.cubes, e, -1);
+        }
+        if (k == 4) (void)edit_elements(&b, part.cubes, 20, true, 0, &seed);
+        coefficients(&part, mass, stiff), coefficients(&whole, mass, stiff);
+        whole.p.multigrid.now.rest = false;
+        REQUIRE(!pal_preconditioner_update(&part.p) && !pal_preconditioner_update(&whole.p));
+        CHECK(same_bits(&part, &whole, &b, &seed));
+        CHECK((share_made(&part) == 1) == (k < 4));
+    }
+    beside_free(&part), beside_free(&whole);
     beam_free(&b);
 }
 
@@ -546,6 +707,8 @@ int main(void)
     RUN(an_edit_drops_levels_in_the_making);
     RUN(threads_do_not_change_a_bit);
     RUN(an_application_is_symmetric_and_positive);
+    RUN(an_update_is_that_of_the_whole_body_to_the_bit);
+    RUN(an_update_takes_all_that_has_changed);
     RUN(the_choice_follows_size_and_elements);
     RUN(what_it_cannot_do_is_refused);
     return check_report();
