@@ -23,7 +23,10 @@ static const struct {
     {"protocol", "", "encoding and decoding of frames", bench_protocol},
     {"sessions", "", "sessions on one core, touched and asleep: steps, slowdown, memory", bench_sessions},
     {"sleep", "", "bodies at rest: awake, not observed, asleep", bench_sleep},
-    {"estimate", "", "predicted cost and error of other configurations against measured ones", bench_estimate},
+    {"estimate", "[SCENE]",
+     "predicted cost and error of other configurations against measured ones\n                      (SCENE: what its "
+     "estimates take)",
+     bench_estimate},
     {"viewers", "[SCENE]", "many viewers of one session, directly and through relays: age, cost, memory",
      bench_viewers},
     {"latency", "", "from a pose put into a session to the frame that shows it", bench_latency},

@@ -23,11 +23,13 @@ enum { MAX_AHEAD = 12, TIMED = 7 };
 struct pal_estimation {
     const _Atomic bool *stop;
     pal_scene *scene; /* the body alone, without tools and display */
-    pal_scene *exact_scene;
     pal_estimate_state state;
-    pal_world *live;        /* the body as it runs */
-    pal_world *exact;       /* the same with PAL_TOLERANCE_EXACT; NULL: its method solves no system */
-    double *first, *second; /* [n_dof][3] */
+    pal_world *live;             /* the body as it runs */
+    const pal_component *solver; /* of it, if it solves systems to a tolerance, else NULL */
+    pal_solve_accuracy exact;    /* of steps without an algebraic error; the solver's own while it makes these */
+    double decades;              /* between the two tolerances, log10 */
+    double *first, *second;      /* [n_dof][3] */
+    double *apart;               /* last equilibrium of the other law less the body's, m [n_node][3] */
     /* springs: voxels for finite elements; n_hex 0: use those of the scene's mesh */
     pal_prepared voxels;
     bool springs, locks;
@@ -98,38 +100,38 @@ static const pal_component *solver_of(const pal_world *world)
     return NULL;
 }
 
-static void put_number(pal_config_entry *item, const char *key, double number)
+static void exchange_accuracy(pal_estimation *w)
 {
-    pal_config_value *known = (pal_config_value *)(uintptr_t)pal_entry_find(item, key);
-    if (known)
-        known->number[0] = number;
-    else
-        (void)pal_entry_put_number(item, key, number, NULL);
+    if (w->solver) w->solver->effect->inspect.accuracy(w->solver->self, &w->exact);
+}
+
+/* how accurate steps without an algebraic error are: at least by a decade better than those of the live solver */
+static void choose_exact(pal_estimation *w)
+{
+    exchange_accuracy(w);
+    const double live = w->exact.tolerance;
+    exchange_accuracy(w);
+    const double exact = fmin(fmax(PAL_EXACT_SHARE * live, PAL_TOLERANCE_EXACT), 0.1 * live);
+    w->exact = (pal_solve_accuracy){.tolerance = exact, .iterations = 400};
+    w->decades = log10(live / exact);
 }
 
 static pal_err make_live(pal_estimation *w, pal_diagnostic *diag)
 {
     PAL_TRY(pal_world_create(w->scene, diag, &w->live));
     pal_world_body(w->live, 0)->load_cap_N = INFINITY;
-    const char *solver = solver_of(w->live)->effect->name;
-    bool implicit = !strcmp(solver, "implicit_euler") || !strcmp(solver, "sdirk2"), cg = !strcmp(solver, "central_cg");
+    const pal_component *solve = solver_of(w->live);
+    const char *solver = solve->effect->name;
     pal_prediction *f = &w->prediction;
-    f->implicit = implicit;
+    f->implicit = !strcmp(solver, "implicit_euler") || !strcmp(solver, "sdirk2");
     f->solver_order = !strcmp(solver, "implicit_euler") ? 1 : !strcmp(solver, "rk4") ? 4 : 2;
     f->work[0] = f->work[1] = f->decade = NAN;
     f->n_node = pal_world_body(w->live, 0)->n_node, f->rest_substeps = pal_world_substeps(w->live);
     f->order = PAL_USUAL_ORDER;
     f->tolerance = f->configuration.tolerance > 0 ? f->configuration.tolerance : PAL_TOLERANCE_LIVE;
-    if (!implicit && !cg) return PAL_ERR_OK;
-    w->exact_scene = malloc(sizeof *w->exact_scene);
-    if (!w->exact_scene) return PAL_ERR_MEMORY;
-    *w->exact_scene = *w->scene;
-    pal_config_entry *item = &w->exact_scene->body[0].solver;
-    if (!item->name[0]) pal_entry_init(item, "solver", solver);
-    put_number(item, "tolerance", PAL_TOLERANCE_EXACT);
-    if (implicit) put_number(item, "iterations", 400);
-    PAL_TRY(pal_world_create(w->exact_scene, diag, &w->exact));
-    pal_world_body(w->exact, 0)->load_cap_N = INFINITY;
+    if (!solve->effect->inspect.accuracy) return PAL_ERR_OK;
+    w->solver = solve;
+    choose_exact(w);
     return PAL_ERR_OK;
 }
 
@@ -187,6 +189,20 @@ static bool is_thin(const pal_tets *tets)
     return min < PAL_FEW_ACROSS * tets->edge_m;
 }
 
+/* Springs are compared with finite elements, and these with a neo-Hookean law. Where there is such a body, which has
+ * supports then, the running one is its own equilibrium; where there is none, or the law is that one, it is solved */
+static pal_err make_fine(pal_estimation *w, const pal_body *body, const char *element, const char *law,
+                         pal_diagnostic *diag)
+{
+    pal_diagnostic refused = {""};
+    const bool compared = !w->springs && strcmp(model_text(&w->scene->body[0], "law", ""), "neo_hookean");
+    if (compared && !pal_rest_solution_make(w->scene, body, NULL, "neo_hookean", &refused, &w->model))
+        return pal_rest_solution_of_state(w->scene, w->live, &w->fine);
+    PAL_TRY(pal_rest_solution_make(w->scene, body, element, law, diag, &w->fine));
+    if (compared) remark(w->diag, refused.text);
+    return PAL_ERR_OK;
+}
+
 /* a mesh or law that is not available leaves its part of the error unknown */
 static pal_err make_rests(pal_estimation *w)
 {
@@ -204,7 +220,7 @@ static pal_err make_rests(pal_estimation *w)
     if (w->springs) element = hexes ? "hex8_bbar" : "tet4", law = "corotational";
     const char *is = element ? element : model_text(def, "element", hexes ? "hex8_bbar" : "tet4");
     w->locks = (!strcmp(is, "tet4") || !strcmp(is, "hex8")) && nearly_incompressible(def);
-    pal_err err = pal_rest_solution_make(w->scene, body, element, law, &diag, &w->fine);
+    pal_err err = make_fine(w, body, element, law, &diag);
     if (err) {
         remark(w->diag, diag.text);
         return err == PAL_ERR_MEMORY ? err : PAL_ERR_OK;
@@ -219,9 +235,6 @@ static pal_err make_rests(pal_estimation *w)
     if (!err) (void)pal_rest_solution_coarser(w->coarse.scene, body, NULL, NULL, NULL, &w->coarsest);
     if (pal_estimate_stopped(w->stop)) return PAL_ERR_STATE;
     if (w->skinned) PAL_TRY(pal_display_error_make(&w->fine, &w->coarse, &w->coarsest, &w->shown));
-    bool neo = !strcmp(model_text(def, "law", ""), "neo_hookean");
-    if (!w->springs && !neo && pal_rest_solution_make(w->scene, body, NULL, "neo_hookean", &diag, &w->model))
-        remark(w->diag, diag.text);
     return PAL_ERR_OK;
 }
 
@@ -236,14 +249,16 @@ static pal_err take_state(pal_estimation *w)
     s->borne = malloc(3 * sizeof(double) * (size_t)body->n_node);
     s->external_force = calloc(3 * (size_t)body->n_node, sizeof(double));
     w->first = malloc(n * sizeof(double)), w->second = malloc(n * sizeof(double));
+    w->apart = calloc(3 * (size_t)body->n_node, sizeof(double));
     for (int i = 0; i < pal_world_component_count(w->live); i++) {
         const pal_effect *effect = pal_world_component(w->live, i)->effect;
         if (effect->stage != PAL_STAGE_FORCE || s->n_component == PAL_ESTIMATE_COMPONENTS) continue;
         s->component[s->n_component] = effect->name;
         s->component_enabled[s->n_component++] = true;
     }
-    return s->x && s->v && s->load && s->external_force && s->borne && w->first && w->second ? PAL_ERR_OK
-                                                                                             : PAL_ERR_MEMORY;
+    return s->x && s->v && s->load && s->external_force && s->borne && w->first && w->second && w->apart
+               ? PAL_ERR_OK
+               : PAL_ERR_MEMORY;
 }
 
 static pal_err open_work(pal_estimation *w, const pal_scene *scene, int body, pal_diagnostic *diag)
@@ -282,14 +297,13 @@ void pal_estimation_close(pal_estimation *w)
 {
     if (!w) return;
     pal_world_destroy(w->live);
-    pal_world_destroy(w->exact);
     pal_rest_solution_free(&w->fine), pal_rest_solution_free(&w->coarse), pal_rest_solution_free(&w->coarsest);
     pal_rest_solution_free(&w->model);
     pal_display_error_free(&w->shown);
     pal_hexes_free(&w->voxels.hexes);
-    free(w->scene), free(w->exact_scene);
+    free(w->scene);
     free(w->state.x), free(w->state.v), free(w->state.load), free(w->state.external_force), free(w->state.borne);
-    free(w->first), free(w->second);
+    free(w->first), free(w->second), free(w->apart);
     pal_estimate_hierarchy_free(&w->family);
     free(w);
 }
@@ -309,12 +323,23 @@ static double median_cost(const pal_estimate_state *s, size_t offset)
     return s->n_cost > 0 ? pal_median(value, s->n_cost) : (double)NAN;
 }
 
+/* forces of a state do not depend on the steps made before it, in which elements may have been inverted */
+static void reset_forces(pal_world *world)
+{
+    for (int i = 0; i < pal_world_component_count(world); i++) {
+        const pal_component *component = pal_world_component(world, i);
+        if (component->effect->stage == PAL_STAGE_FORCE && component->effect->reset)
+            component->effect->reset(component->self, pal_world_view_body(world, 0));
+    }
+}
+
 /* sets the state and its loads in a world of the same mesh */
 static pal_err set_state(const pal_estimation *w, pal_world *world)
 {
     const pal_estimate_state *s = &w->state;
     pal_body *body = pal_world_body(world, 0);
-    PAL_TRY(pal_estimate_match(s, world, world == w->exact ? w->exact_scene : w->scene, true));
+    PAL_TRY(pal_estimate_match(s, world, w->scene, true));
+    reset_forces(world);
     for (int i = 0; i < body->n_node; i++) PAL_TRY(pal_world_load(world, 0, i, s->load + 3 * (size_t)i));
     memcpy(body->x, s->x, 3 * sizeof(double) * (size_t)body->n_dof);
     memcpy(body->v, s->v, 3 * sizeof(double) * (size_t)body->n_dof);
@@ -342,16 +367,16 @@ static void find_time_parts(pal_estimation *w, pal_estimate *out)
     double step_s = w->scene->step_s, ms = isnan(out->ms) ? 1 : out->ms;
     int n_sub = w->state.n_substep > 0 ? w->state.n_substep : 1, n_dof = w->state.n_dof;
     int n = (int)fmin(fmin(MAX_AHEAD, ceil(PAL_AHEAD_S / step_s)), fmax(1, PAL_AHEAD_MS / (4 * ms)));
-    pal_world *exact = w->exact ? w->exact : w->live;
     double live_ms = NAN, exact_ms = NAN, half_ms;
-    out->algebraic_m = w->exact ? NAN : 0;
-    if (w->exact && !make_steps(w, w->live, n, step_s, w->first, &live_ms)) return;
-    if (!make_steps(w, exact, n * n_sub, step_s / n_sub, w->second, &exact_ms)) return;
-    if (w->exact) out->algebraic_m = pal_max_dist3(w->first, w->second, n_dof);
-    if (!make_steps(w, exact, 2 * n * n_sub, 0.5 * step_s / n_sub, w->first, &half_ms)) return;
-    if (w->exact && n_sub == 1)
-        w->prediction.decade =
-            pow(fmax(exact_ms / live_ms, 1), 1 / log10(w->prediction.tolerance / PAL_TOLERANCE_EXACT));
+    out->algebraic_m = w->solver ? NAN : 0;
+    if (w->solver && !make_steps(w, w->live, n, step_s, w->first, &live_ms)) return;
+    exchange_accuracy(w);
+    bool good = make_steps(w, w->live, n * n_sub, step_s / n_sub, w->second, &exact_ms);
+    if (good && w->solver) out->algebraic_m = pal_max_dist3(w->first, w->second, n_dof);
+    good = good && make_steps(w, w->live, 2 * n * n_sub, 0.5 * step_s / n_sub, w->first, &half_ms);
+    exchange_accuracy(w);
+    if (!good) return;
+    if (w->solver && n_sub == 1) w->prediction.decade = pow(fmax(exact_ms / live_ms, 1), 1 / w->decades);
     out->time_m = pal_max_dist3(w->first, w->second, n_dof) / (1 - ldexp(1, -w->prediction.solver_order));
 }
 
@@ -468,6 +493,16 @@ static void compare_fitted(pal_estimation *w, pal_estimate *out)
     remark(out->diag, "fitted: the mesh's part is in the model's");
 }
 
+/* The neo-Hookean equilibrium is sought from where it was beside the body's the last time */
+static bool find_model(pal_estimation *w, const pal_body *body)
+{
+    const int n = 3 * w->state.n_node;
+    for (int i = 0; i < n; i++) w->second[i] = w->fine.x[i] + w->apart[i];
+    const bool found = pal_rest_solution_find(&w->model, &w->state, body, w->second, w->stop);
+    for (int i = 0; i < n; i++) w->apart[i] = found ? w->model.x[i] - w->fine.x[i] : 0;
+    return found;
+}
+
 static void compare_models(pal_estimation *w, const pal_body *body, pal_estimate *out)
 {
     int n = w->state.n_node;
@@ -478,7 +513,7 @@ static void compare_models(pal_estimation *w, const pal_body *body, pal_estimate
             w->shown.n > 0 ? pal_display_error_skin(&w->shown, w->state.x, 0) : pal_max_dist3(w->state.x, w->fine.x, n);
     else if (!w->model.world)
         out->model_m = !strcmp(model_text(&w->scene->body[0], "law", ""), "neo_hookean") ? 0 : (double)NAN;
-    else if (pal_rest_solution_find(&w->model, &w->state, body, w->fine.x, w->stop))
+    else if (find_model(w, body))
         out->model_m = pal_max_dist3(w->model.x, w->fine.x, n);
 }
 

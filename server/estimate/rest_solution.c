@@ -296,11 +296,18 @@ pal_err pal_rest_solution_sized(const pal_scene *scene, const pal_body *body, co
     return err;
 }
 
+pal_err pal_rest_solution_of_state(pal_scene *scene, pal_world *world, pal_rest_solution *out)
+{
+    const int n_node = pal_world_view_body(world, 0)->n_node;
+    *out = (pal_rest_solution){.scene = scene, .own = true, .world = world, .n_node = n_node};
+    out->x = malloc(3 * sizeof *out->x * (size_t)n_node);
+    return out->x ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
 void pal_rest_solution_free(pal_rest_solution *r)
 {
-    pal_world_destroy(r->world);
+    if (!r->own) pal_world_destroy(r->world), free(r->scene);
     pal_prepared_free(&r->mesh);
-    free(r->scene);
     pal_interpolation_free(&r->by);
     free(r->common), free(r->x);
     memset(r, 0, sizeof *r);
@@ -393,7 +400,7 @@ static void take_positions(pal_rest_solution *r, const pal_body *body)
 static bool find(pal_rest_solution *r, const pal_estimate_state *state, const pal_body *body, const double *from,
                  double part, const _Atomic bool *stop)
 {
-    bool good = !put_state(r, state, from, part) && converge(r, state->material.young_Pa, stop);
+    bool good = r->own || (!put_state(r, state, from, part) && converge(r, state->material.young_Pa, stop));
     r->known = good;
     if (good) take_positions(r, body);
     return good;

@@ -8,6 +8,7 @@
 
 typedef struct pal_rest_solution {
     pal_scene *scene;
+    bool own;          /* the running body as it is: world and scene are borrowed, and nothing is solved */
     pal_prepared mesh; /* owned; n_node 0: the mesh of the source scene */
     pal_world *world;
     pal_interpolation by; /* from its nodes to those of the running body; n_row 0: the nodes are identical */
@@ -35,6 +36,9 @@ pal_err pal_rest_solution_coarser(const pal_scene *scene, const pal_body *body, 
  * memory of a factor and less time. REFUSED also if the body already has that mesh. */
 pal_err pal_rest_solution_sized(const pal_scene *scene, const pal_body *body, const pal_configuration *configuration,
                                 int size, const char *law, pal_rest_solution *out);
+/* The running body as it is: its shape is the equilibrium under the loads that it bears (estimate.h), once `world`,
+ * made from `scene`, has its state. Borrows both. MEMORY */
+pal_err pal_rest_solution_of_state(pal_scene *scene, pal_world *world, pal_rest_solution *out);
 void pal_rest_solution_free(pal_rest_solution *rest); /* accepts a zeroed struct */
 /* Interpolates in the elements of a rest solution at every stride-th of the points x [n * stride][3] (body frame).
  * Points slightly outside are extrapolated; inside: they are moved into the nearest element first. Error: MEMORY. */

@@ -106,6 +106,13 @@ typedef struct pal_solve_report {
     double analyse_s, assemble_s, factor_s, solve_s;
 } pal_solve_report;
 
+/* how accurately a solver solves its systems; values as of its keys */
+typedef struct pal_solve_accuracy {
+    double tolerance; /* relative, of the residual                                                       */
+    int iterations;   /* of one solve, at most                                                           */
+    bool refresh;     /* preconditioners are made newer beside the steps where that would save iterations */
+} pal_solve_accuracy;
+
 /* stress at a quadrature point of an element; one call for each point, element by element */
 typedef struct pal_stress_point {
     int element, n_corner;
@@ -215,6 +222,9 @@ typedef struct pal_effect {
          * not known */
         void (*stress)(void *self, const pal_body *body, pal_stress_take *take, void *user);
         void (*report)(const void *self, pal_solve_report *out); /* SOLVE */
+        /* SOLVE: exchanges *accuracy with its own, but for members that it has no use for; NULL: it solves no systems.
+         * Between steps. [sim] */
+        void (*accuracy)(void *self, pal_solve_accuracy *accuracy);
     } inspect;
 } pal_effect;
 

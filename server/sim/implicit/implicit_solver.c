@@ -619,3 +619,11 @@ void pal_implicit_report(const void *self, pal_solve_report *out)
     *out = core->report;
     pal_compliance_solver_report(&core->compliance, &core->preconditioner, out);
 }
+
+void pal_implicit_accuracy(void *self, pal_solve_accuracy *accuracy)
+{
+    pal_implicit_options *own = &((pal_implicit *)self)->options;
+    const pal_solve_accuracy before = {own->tolerance, own->iterations, own->refresh};
+    own->tolerance = accuracy->tolerance, own->iterations = accuracy->iterations, own->refresh = accuracy->refresh;
+    *accuracy = before;
+}

@@ -87,8 +87,9 @@ double pal_implicit_limit(void *self, pal_step *step);
 pal_err pal_implicit_material(void *self, const pal_body *body, const pal_material *material, pal_diagnostic *diag);
 void pal_implicit_reset(void *self, const pal_body *body);
 void pal_implicit_report(const void *self, pal_solve_report *out);
+void pal_implicit_accuracy(void *self, pal_solve_accuracy *accuracy);
 #define PAL_IMPLICIT_HOOKS                                                                                             \
     .stage = PAL_STAGE_SOLVE, .implicit = true, .keeps_components = true, .destroy = pal_implicit_destroy,             \
     .bounds.limit = pal_implicit_limit, .material = pal_implicit_material, .reset = pal_implicit_reset,                \
-    .inspect.report = pal_implicit_report
+    .inspect = {.report = pal_implicit_report, .accuracy = pal_implicit_accuracy}
 #endif

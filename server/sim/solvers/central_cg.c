@@ -481,5 +481,13 @@ static void report(const void *self, pal_solve_report *out)
     out->factor_nonzeros = solver->factored ? solver->envelope.start[solver->envelope.n] : 0;
 }
 
+static void accuracy(void *self, pal_solve_accuracy *to)
+{
+    central *solver = self;
+    const double before = solver->tolerance;
+    solver->tolerance = to->tolerance;
+    to->tolerance = before;
+}
+
 const pal_effect pal_effect_central_cg = {PAL_EFFECT("central_cg", SOLVE), .bounds.limit = limit, .material = material,
-                                          .reset = reset, .inspect.report = report};
+                                          .reset = reset, .inspect = {.report = report, .accuracy = accuracy}};
