@@ -80,16 +80,16 @@ pal_err pal_hex_levels_make(const pal_body *body, const pal_elastic_hexes *cubes
                : PAL_ERR_MEMORY;
 }
 
-pal_err pal_hex_multigrid_make(pal_hex_levels *levels, pal_arena *arena, pal_hex_multigrid *out)
+pal_err pal_hex_multigrid_make(pal_hex_levels *levels, bool refreshed, pal_arena *arena, pal_hex_multigrid *out)
 {
     const size_t n = (size_t)levels->n_slot, n_lane = PAL_LANES * (size_t)levels->cubes->n_block;
     *out = (pal_hex_multigrid){.levels = levels};
-    for (int k = 0; k < 2; k++) {
+    for (int k = 0; k < (refreshed ? 2 : 1); k++) {
         pal_hex_values *values = k == 0 ? &out->now : &out->next;
         values->weight = PAL_NEW(arena, float, n), values->inverse = PAL_NEW(arena, float, n);
         if (!values->weight || !values->inverse) return PAL_ERR_MEMORY;
     }
-    if (levels->single.rotation) {
+    if (levels->single.rotation && refreshed) {
         out->turned = PAL_NEW(arena, float, 9 * n_lane);
         if (!out->turned) return PAL_ERR_MEMORY;
     }

@@ -55,13 +55,14 @@ typedef struct pal_hex_multigrid {
     pal_hex_values now, next; /* in use; in the making on the spare thread */
     pal_spare_thread spare_thread;
     pal_err outcome; /* of the spare thread */
-    float *turned;   /* rotations at the refresh, as in `single`; NULL: the law is linear */
+    float *turned;   /* rotations at the refresh, as in `single`; NULL: the law is linear, or there is no refresh */
 } pal_hex_multigrid;
 
 /* MEMORY. [load] */
 pal_err pal_hex_levels_make(const pal_body *body, const pal_elastic_hexes *cubes, pal_arena *arena,
                             pal_hex_levels *out);
-pal_err pal_hex_multigrid_make(pal_hex_levels *levels, pal_arena *arena, pal_hex_multigrid *out);
+/* refreshed: it may be. MEMORY. [load] */
+pal_err pal_hex_multigrid_make(pal_hex_levels *levels, bool refreshed, pal_arena *arena, pal_hex_multigrid *out);
 void pal_hex_multigrid_destroy(pal_hex_multigrid *mg);
 /* takes material and rotations of the last linearise, where they are others than at the last update. NUMERIC: not
  * positive definite; MEMORY. No solve may follow an error */

@@ -110,7 +110,7 @@ pal_err pal_implicit_make(pal_config_entry *item, pal_build *build, double share
     PAL_TRY(pal_preconditioner_make(&options, &core->system, &core->rotations, build->arena, build->diag,
                                     &core->preconditioner));
     pal_err err = factor_at_rest(core);
-    if (!err) err = pal_compliance_solver_make(&core->preconditioner, build->arena, &core->compliance);
+    if (!err) err = pal_compliance_solver_make(&core->preconditioner, &core->cg, build->arena, &core->compliance);
     if (err == PAL_ERR_NUMERIC)
         return PAL_REFUSE(build->diag,
                           "body \"%s\": mass and stiffness at rest for steps of %g s make no positive definite matrix",

@@ -104,7 +104,7 @@ static pal_err make_multigrid(pal_preconditioner *p, const pal_elastic_hexes *cu
                           "body \"%s\": a multigrid preconditioner needs more than the body's %d nodes; take "
                           "\"factor\"",
                           body->name, body->n_node);
-    return pal_hex_multigrid_make(p->levels, arena, &p->multigrid);
+    return pal_hex_multigrid_make(p->levels, !p->shares, arena, &p->multigrid);
 }
 
 pal_err pal_preconditioner_make(const pal_preconditioner_options *options, pal_system *system,
@@ -118,8 +118,10 @@ pal_err pal_preconditioner_make(const pal_preconditioner_options *options, pal_s
         .kind = options->kind, .system = system, .rotations = rotations, .single = options->single};
     if (like) out->kind = like->kind;
     PAL_TRY(pal_warp_make(rotations, arena, &out->warp));
-    if (!PAL_NEW_DOUBLES(arena, 3 * n, &out->work) || !PAL_NEW_DOUBLES(arena, 4 * n, &out->next)) return PAL_ERR_MEMORY;
     if (out->kind == PAL_PRECONDITION_AUTO) PAL_TRY(choose(out, cubes, arena));
+    const bool multigrid = out->kind == PAL_PRECONDITION_MULTIGRID;
+    if (!multigrid && !PAL_NEW_DOUBLES(arena, 3 * n, &out->work)) return PAL_ERR_MEMORY;
+    if (!(multigrid && like) && !PAL_NEW_DOUBLES(arena, 4 * n, &out->next)) return PAL_ERR_MEMORY;
     switch (out->kind) {
     case PAL_PRECONDITION_MULTIGRID:
         return make_multigrid(out, cubes, like, arena, diag);
@@ -202,7 +204,7 @@ void pal_preconditioner_rotate(pal_preconditioner *p)
 
 bool pal_preconditioner_refresh(pal_preconditioner *p, bool at_rest)
 {
-    if (!pal_preconditioner_ready(p)) return false;
+    if (!pal_preconditioner_ready(p) || p->shares) return false;
     double flops;
     if (p->kind == PAL_PRECONDITION_MULTIGRID) {
         if (pal_hex_multigrid_refresh(&p->multigrid, p->system->mass, p->system->stiff + p->system->viscous))

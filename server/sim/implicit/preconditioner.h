@@ -39,8 +39,8 @@ typedef struct pal_preconditioner {
     bool shares;            /* the levels are of the one that it is `like`, which sees to their rotations */
     pal_hex_multigrid multigrid;
     double *inverse; /* jacobi [n_dof][9] */
-    double *work;    /* [n_dof][3] */
-    double *next;    /* quat of those in progress [n_dof][4] */
+    double *work;    /* [n_dof][3]; NULL: multigrid */
+    double *next;    /* quat of those in progress [n_dof][4]; NULL: levels that are shared */
     bool single;     /* the factor is in single precision */
     bool refreshed;  /* factor or levels are newer than the last update */
     bool pending;    /* newer ones are in progress */
@@ -85,8 +85,8 @@ static inline bool pal_preconditioner_ready(const pal_preconditioner *p)
 {
     return !p->pending && !(p->left_s > 0);
 }
-/* starts a factor or levels on a spare thread, of the system as it is or, at_rest, as of rest; false: not ready, or of
- * another kind */
+/* starts a factor or levels on a spare thread, of the system as it is or, at_rest, as of rest; false: not ready, levels
+ * that are shared, or of another kind */
 bool pal_preconditioner_refresh(pal_preconditioner *p, bool at_rest);
 /* once per sub-step: adopts what is due, and waits for it if necessary */
 void pal_preconditioner_step(pal_preconditioner *p, double dt_s);

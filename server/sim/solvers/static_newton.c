@@ -232,7 +232,7 @@ static pal_err make_factors(static_newton *solver, pal_build *build)
     pal_system_linearise(&solver->system);
     if (solver->relieved) PAL_TRY(choose_shift(solver));
     pal_err err = solver->linear == LINEAR_DIRECT ? PAL_ERR_OK : factor(solver);
-    if (!err) err = pal_compliance_solver_make(&solver->preconditioner, build->arena, &solver->compliance);
+    if (!err) err = pal_compliance_solver_make(&solver->preconditioner, &solver->cg, build->arena, &solver->compliance);
     if (err == PAL_ERR_NUMERIC)
         return PAL_REFUSE(build->diag, "body \"%s\": its stiffness at rest is not positive definite", body->name);
     return err;
