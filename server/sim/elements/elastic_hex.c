@@ -55,10 +55,7 @@ static pal_err take_memory(pal_elastic_hexes *cubes, pal_arena *arena)
         return PAL_ERR_MEMORY;
     cubes->edited = PAL_NEW(arena, uint32_t, cubes->n_hex);
     if (!cubes->edited) return PAL_ERR_MEMORY;
-    if (!cubes->implicit) return PAL_ERR_OK;
-    cubes->entry = PAL_NEW(arena, int32_t, 36 * (size_t)cubes->n_hex);
-    if (!cubes->entry) return PAL_ERR_MEMORY;
-    if (cubes->law != PAL_LAW_NEO_HOOKEAN) return PAL_ERR_OK;
+    if (!cubes->implicit || cubes->law != PAL_LAW_NEO_HOOKEAN) return PAL_ERR_OK;
     cubes->tangent = PAL_NEW(arena, double, 231 * n);
     return cubes->tangent ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
@@ -170,35 +167,28 @@ pal_err pal_hex_make(const pal_hex_options *options, pal_build *build, const cha
     return PAL_ERR_OK;
 }
 
-/* index in the pattern of each pair of corners */
-static void find_entries(pal_elastic_hexes *cubes, const pal_block_matrix *to)
+double *pal_hex_block(const pal_block_matrix *to, int i, int j, bool *transposed)
 {
-    cubes->entry_of = to, cubes->entry_row = to->row;
-    for (int e = 0; e < cubes->n_hex; e++)
-        for (int c = 0; c < 8; c++)
-            for (int d = c; d < 8; d++) {
-                int i = cubes->hexes->node[8 * e + c], j = cubes->hexes->node[8 * e + d];
-                int at = i >= j ? pal_block_matrix_find(to, i, j) : ~pal_block_matrix_find(to, j, i);
-                cubes->entry[36 * e + pal_hex_pair(c, d)] = at;
-            }
+    *transposed = i < j;
+    return to->value + 9 * (size_t)(i < j ? pal_block_matrix_find(to, j, i) : pal_block_matrix_find(to, i, j));
 }
 
 /* adds the 36 blocks of one lane where they belong */
-static void add_entries(const int32_t *entry, const double *part, double *value)
+static void add_blocks(const int32_t *node, const double *part, const pal_block_matrix *matrix)
 {
-    for (int p = 0; p < 36; p++) {
-        int at = entry[p];
-        double *to = value + 9 * (at >= 0 ? at : ~at);
-        for (int i = 0; i < 3; i++)
-            for (int j = 0; j < 3; j++) to[at >= 0 ? 3 * i + j : 3 * j + i] += part[(9 * p + 3 * i + j) * PAL_LANES];
-    }
+    for (int c = 0; c < 8; c++)
+        for (int d = c; d < 8; d++) {
+            const double *from = part + 9 * PAL_LANES * pal_hex_pair(c, d);
+            bool transposed;
+            double *to = pal_hex_block(matrix, node[c], node[d], &transposed);
+            for (int i = 0; i < 3; i++)
+                for (int j = 0; j < 3; j++) to[transposed ? 3 * j + i : 3 * i + j] += from[(3 * i + j) * PAL_LANES];
+        }
 }
 
 void pal_hex_assemble(pal_elastic_hexes *cubes, double k, pal_block_matrix *to)
 {
     double part[36 * 9 * PAL_LANES];
-    if (!cubes->entry) return;
-    if (cubes->entry_of != to || cubes->entry_row != to->row) find_entries(cubes, to);
     for (int b = 0; b < cubes->n_block; b++) {
         if (cubes->law == PAL_LAW_NEO_HOOKEAN)
             pal_hex_neo_blocks(cubes, b, k, part);
@@ -206,7 +196,7 @@ void pal_hex_assemble(pal_elastic_hexes *cubes, double k, pal_block_matrix *to)
             pal_hex_corot_blocks(cubes, b, k, part);
         for (int l = 0; l < PAL_LANES; l++) {
             int e = cubes->hex[PAL_LANES * b + l];
-            if (e >= 0) add_entries(cubes->entry + 36 * e, part + l, to->value);
+            if (e >= 0) add_blocks(cubes->hexes->node + 8 * (size_t)e, part + l, to);
         }
     }
     pal_hex_ground_assemble(cubes, k, to);

@@ -57,9 +57,6 @@ typedef struct pal_elastic_hexes {
     double *q;           /* rotations as quaternions, warm start             [n_block][4][8] */
     double *rotation;    /* rotations at the last linearise                  [n_block][9][8] */
     double *tangent;     /* neo_hookean: K in modes at the last linearise    [n_block][231][8]; NULL: not kept */
-    int32_t *entry;      /* implicit: blocks of the pattern last assembled into [n_hex][36], ~ where transposed */
-    const int32_t *entry_row;
-    const pal_block_matrix *entry_of;
 
     pal_force_cache force_cache; /* implicit: of the cubes, not of regions */
 
@@ -88,7 +85,7 @@ static inline bool pal_hex_is_cut(const pal_elastic_hexes *cubes, int block)
 {
     return cubes->cut && cubes->cut[block] >= 0;
 }
-/* block pairs of corners: index of c <= d in `reference` and `entry` */
+/* block pairs of corners: index of c <= d in `reference` */
 static inline int pal_hex_pair(int c, int d)
 {
     return c * (17 - c) / 2 + d - c;
@@ -96,6 +93,8 @@ static inline int pal_hex_pair(int c, int d)
 
 /* effect.h assemble, rotate, measure, stress; team: NULL, or threads that share the work */
 void pal_hex_assemble(pal_elastic_hexes *cubes, double k, pal_block_matrix *to);
+/* the block of nodes i and j in a pattern that couples them; *transposed: it is that of j and i */
+double *pal_hex_block(const pal_block_matrix *to, int i, int j, bool *transposed);
 void pal_hex_rotate(const pal_elastic_hexes *cubes, pal_team *team, double *rotation);
 void pal_hex_measure(pal_elastic_hexes *cubes, const pal_body *body, pal_field field, double *sum, double *volume_m3);
 void pal_hex_stress(pal_elastic_hexes *cubes, const pal_body *body, pal_stress_take *take, void *user);

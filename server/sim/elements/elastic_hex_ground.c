@@ -57,11 +57,13 @@ void pal_hex_ground_assemble(const pal_elastic_hexes *cubes, double k, pal_block
 {
     const pal_ground *ground = cubes->ground;
     for (int i = 0; ground && i < ground->n; i++)
-        for (int p = 0; p < 36; p++) {
-            const int at = cubes->entry[36 * ground->item[i].element + p];
-            double *value = to->value + 9 * (at >= 0 ? at : ~at);
-            for (int j = 0; j < 9; j += 4) value[j] += k * ground->item[i].k_N_m[p];
-        }
+        for (int c = 0; c < 8; c++)
+            for (int d = c; d < 8; d++) {
+                const int32_t *node = cubes->hexes->node + 8 * (size_t)ground->item[i].element;
+                bool transposed;
+                double *value = pal_hex_block(to, node[c], node[d], &transposed);
+                for (int j = 0; j < 9; j += 4) value[j] += k * ground->item[i].k_N_m[pal_hex_pair(c, d)];
+            }
 }
 
 void pal_hex_ground_block(const pal_elastic_hexes *cubes, int e, double k, double to[24][24])
