@@ -29,7 +29,7 @@ struct pal_estimation {
     pal_solve_accuracy exact;    /* of steps without an algebraic error; the solver's own while it makes these */
     double decades;              /* between the two tolerances, log10 */
     double *first, *second;      /* [n_dof][3] */
-    double *apart;               /* last equilibrium of the other law less the body's, m [n_node][3] */
+    double *apart;               /* last equilibrium of another model or law less the body's, m [n_node][3] */
     /* springs: voxels for finite elements; n_hex 0: use those of the scene's mesh */
     pal_prepared voxels;
     bool springs, locks;
@@ -422,6 +422,22 @@ static bool find_borne(pal_estimation *w)
     return true;
 }
 
+/* the equilibrium of another model or law, sought from where it was beside x the last time */
+static bool find_beside(pal_estimation *w, pal_rest_solution *other, const double *x, const pal_body *body)
+{
+    const int n = 3 * w->state.n_node;
+    for (int i = 0; i < n; i++) w->second[i] = x[i] + w->apart[i];
+    const bool found = pal_rest_solution_find(other, &w->state, body, w->second, w->stop);
+    for (int i = 0; i < n; i++) w->apart[i] = found ? other->x[i] - x[i] : 0;
+    return found;
+}
+
+static bool find_fine(pal_estimation *w, const pal_body *body)
+{
+    return w->springs ? find_beside(w, &w->fine, w->state.x, body)
+                      : pal_rest_solution_find(&w->fine, &w->state, body, w->state.x, w->stop);
+}
+
 static double known(double part)
 {
     return isnan(part) ? 0 : part;
@@ -493,16 +509,6 @@ static void compare_fitted(pal_estimation *w, pal_estimate *out)
     remark(out->diag, "fitted: the mesh's part is in the model's");
 }
 
-/* The neo-Hookean equilibrium is sought from where it was beside the body's the last time */
-static bool find_model(pal_estimation *w, const pal_body *body)
-{
-    const int n = 3 * w->state.n_node;
-    for (int i = 0; i < n; i++) w->second[i] = w->fine.x[i] + w->apart[i];
-    const bool found = pal_rest_solution_find(&w->model, &w->state, body, w->second, w->stop);
-    for (int i = 0; i < n; i++) w->apart[i] = found ? w->model.x[i] - w->fine.x[i] : 0;
-    return found;
-}
-
 static void compare_models(pal_estimation *w, const pal_body *body, pal_estimate *out)
 {
     int n = w->state.n_node;
@@ -513,7 +519,7 @@ static void compare_models(pal_estimation *w, const pal_body *body, pal_estimate
             w->shown.n > 0 ? pal_display_error_skin(&w->shown, w->state.x, 0) : pal_max_dist3(w->state.x, w->fine.x, n);
     else if (!w->model.world)
         out->model_m = !strcmp(model_text(&w->scene->body[0], "law", ""), "neo_hookean") ? 0 : (double)NAN;
-    else if (find_model(w, body))
+    else if (find_beside(w, &w->model, w->fine.x, body))
         out->model_m = pal_max_dist3(w->model.x, w->fine.x, n);
 }
 
@@ -542,7 +548,7 @@ static void find_rests(pal_estimation *w, pal_estimate *out)
         out->model_m = out->energy_error_percent = 0;
         return;
     }
-    if (!find_borne(w) || !pal_rest_solution_find(&w->fine, &w->state, body, w->state.x, w->stop)) {
+    if (!find_borne(w) || !find_fine(w, body)) {
         out->locking = false;
         remark(out->diag, "no rest was found under these loads");
         return;
