@@ -1,5 +1,5 @@
 /* The parts of the error of one body: from future steps (time, algebraic) and from equilibria (the other parts). Before
- * it, what they need: its own scene, live and nearly exact worlds, meshes for the equilibria. */
+ * it, what they need: its own scene, a live world, meshes for the equilibria. */
 #include "server/estimate/estimation.h"
 
 #include "server/base/clock.h"
