@@ -572,7 +572,7 @@ static void an_update_is_that_of_the_whole_body_to_the_bit(void)
         bool near;
         double times;
     } edit[] = {{1, true, 0.5}, {60, true, 3}, {40, false, 0.8}, {30, true, 80}, {6, false, 2}, {30, true, 0.01}};
-    for (int shape = 0; shape < 4; shape++) {
+    for (int shape = 0; shape < CHECK_REPEATS(4, 2); shape++) {
         fem_beam b;
         beside part;
         uint64_t seed = 11 + (uint64_t)shape;
