@@ -1,5 +1,6 @@
 /* `palpate bench springs`: milliseconds of a sub-step (forces and integration) and of skinning, against the limits of
- * this machine: memory triad and fused multiply-add. Medians over steps; a limit is the best of several runs.
+ * this machine: memory triad and fused multiply-add; and how many times as fast they are with two threads as with one,
+ * in worlds that step in turn. Medians over steps; a limit is the best of several runs.
  *
  * Floating point operations are counted from the kernels (a root counts 17: a guess and four Newton steps); bytes are
  * those that a sub-step must stream: constants, first slots, positions and forces of the nodes. The kernels add and
@@ -15,11 +16,12 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { N_CASE = 3, N_STEP = 31, TRIAD = 4 << 20, CHAINS = 128, LINKS = 16 };
+enum { N_CASE = 4, N_STEP = 31, N_PART = 6, TRIAD = 4 << 20, CHAINS = 128, LINKS = 16 };
 
 typedef struct result {
     int n_sub;
-    double ms[6], flop, byte; /* ms: a sub-step; its three spring components; verlet; skinning of a frame */
+    double ms[N_PART], flop, byte; /* ms: a sub-step; its three spring components; verlet; skinning of a frame */
+    double faster[N_PART];         /* with two threads */
 } result;
 
 /* GB/s of a = b + s c, far beyond the caches */
@@ -63,21 +65,21 @@ static double measure_fma(void)
     return value[0] == value[CHAINS - 1] ? 2e-9 * CHAINS * LINKS * n / best : 0;
 }
 
-/* an organ with a surface of 50,000 triangles, at the resolution that gives nearest to 13,000 tetrahedra */
-static pal_err make_organ(pal_prepared *out, pal_diagnostic *diag)
+/* an organ with a surface of n_tri triangles, at the resolution that gives nearest to n_tet tetrahedra */
+static pal_err make_organ(int n_tri, int n_tet, pal_prepared *out, pal_diagnostic *diag)
 {
     pal_surface surface = {0};
-    PAL_TRY(pal_organ_make(50000, &surface));
+    PAL_TRY(pal_organ_make(n_tri, &surface));
     pal_err err = PAL_ERR_OK;
     int best = 0;
     double nearest = INFINITY;
-    for (int resolution = 14; resolution < 40 && !err; resolution++) {
+    for (int resolution = 14; resolution < 60 && !err; resolution++) {
         pal_voxel_options options = {.resolution = resolution, .border = true};
         pal_voxels voxels;
         pal_voxel_report report;
         err = pal_voxels_fill(&surface, &options, &voxels, &report, diag);
         if (err) break;
-        double apart = fabs(5.0 * (double)(voxels.n_inside + voxels.n_border) - 13000);
+        double apart = fabs(5.0 * (double)(voxels.n_inside + voxels.n_border) - n_tet);
         if (apart < nearest) nearest = apart, best = resolution;
         pal_voxels_free(&voxels);
     }
@@ -102,27 +104,48 @@ static pal_err count_work(const pal_tets *tets, result *out)
     return err;
 }
 
-static pal_err run_world(const pal_scene *scene, result *out, pal_diagnostic *diag)
+/* times of a step, ms */
+static pal_err run_step(pal_world *world, double step_s, double ms[N_PART])
 {
     static const char *const spring[3] = {"edge_distance", "face_area", "tet_volume"};
-    double ms[6][N_STEP]; /* sub-step, springs, solver, skinning */
-    pal_world *world;
-    PAL_TRY(pal_world_create(scene, diag, &world));
-    pal_err err = PAL_ERR_OK;
-    for (int i = -2; i < N_STEP && !err; i++) {
-        pal_world_wake(world);
-        err = pal_world_step(world, scene->step_s);
-        if (i < 0) continue;
-        out->n_sub = pal_world_substeps(world);
-        for (int k = 0; k < 3; k++) ms[1 + k][i] = bench_component_ms(world, NULL, spring[k]) / out->n_sub;
-        ms[4][i] = bench_component_ms(world, "solve", NULL) / out->n_sub;
-        ms[0][i] = bench_component_ms(world, "force", NULL) / out->n_sub + ms[4][i];
-        ms[5][i] = bench_component_ms(world, "output", NULL);
-    }
-    pal_world_destroy(world);
-    if (err) return pal_diagnostic_set(diag, err, "the step failed: %s", pal_err_text(err));
-    for (int k = 0; k < 6; k++) out->ms[k] = pal_median(ms[k], N_STEP);
+    pal_world_wake(world);
+    PAL_TRY(pal_world_step(world, step_s));
+    const int n_sub = pal_world_substeps(world);
+    for (int k = 0; k < 3; k++) ms[1 + k] = bench_component_ms(world, NULL, spring[k]) / n_sub;
+    ms[4] = bench_component_ms(world, "solve", NULL) / n_sub;
+    ms[0] = bench_component_ms(world, "force", NULL) / n_sub + ms[4];
+    ms[5] = bench_component_ms(world, "output", NULL);
     return PAL_ERR_OK;
+}
+
+static pal_err run_worlds(pal_world *const world[2], double step_s, result *out)
+{
+    double one[N_PART][N_STEP], faster[N_PART][N_STEP];
+    for (int i = -2; i < N_STEP; i++) {
+        double ms[2][N_PART];
+        for (int w = 0; w < 2; w++) PAL_TRY(run_step(world[w], step_s, ms[w]));
+        for (int k = 0; k < N_PART && i >= 0; k++) one[k][i] = ms[0][k], faster[k][i] = ms[0][k] / ms[1][k];
+    }
+    out->n_sub = pal_world_substeps(world[0]);
+    for (int k = 0; k < N_PART; k++)
+        out->ms[k] = pal_median(one[k], N_STEP), out->faster[k] = pal_median(faster[k], N_STEP);
+    return PAL_ERR_OK;
+}
+
+static pal_err run_world(pal_scene *scene, result *out, pal_diagnostic *diag)
+{
+    pal_world *world[2] = {NULL, NULL};
+    pal_err err = PAL_ERR_OK;
+    for (int w = 0; w < 2 && !err; w++) {
+        scene->threads = w + 1;
+        err = pal_world_create(scene, diag, &world[w]);
+    }
+    if (!err) {
+        err = run_worlds(world, scene->step_s, out);
+        if (err) pal_diagnostic_set(diag, err, "the step failed: %s", pal_err_text(err));
+    }
+    for (int w = 0; w < 2; w++) pal_world_destroy(world[w]);
+    return err;
 }
 
 static pal_err run_case(const char *name, const pal_prepared *mesh, double limit_ms, const double machine[2],
@@ -147,24 +170,29 @@ static pal_err run_case(const char *name, const pal_prepared *mesh, double limit
               NUMBER("of_fma", "of limit", 8, 2, gflops / machine[1]), NUMBER("GB_s", "GB/s", 6, 1, gbs),
               NUMBER("of_triad", "of triad", 8, 2, gbs / machine[0]), NUMBER("substeps", "sub-steps", 9, 0, c.n_sub),
               NUMBER("triangles", "triangles", 9, 0, skinned ? mesh->surface.n_tri : 0),
-              NUMBER("skin_ms", "skin ms", 8, 3, skinned ? c.ms[5] : NAN));
+              NUMBER("skin_ms", "skin ms", 8, 3, skinned ? c.ms[5] : NAN),
+              NUMBER("two_threads", "x on 2", 6, 2, c.faster[0]),
+              NUMBER("skin_two_threads", "skin x on 2", 11, 2, skinned ? c.faster[5] : NAN));
     return PAL_ERR_OK;
 }
 
 pal_err bench_springs(pal_table *r, pal_diagnostic *diag)
 {
     static const int box[2][3] = {{20, 13, 10}, {40, 26, 25}};
-    static const char *const name[N_CASE] = {"box 13k", "box 130k", "organ 13k"};
-    static const double limit_ms[N_CASE] = {0.25, 3, 0.25};
+    static const char *const name[N_CASE] = {"box 13k", "box 130k", "organ 13k", "organ 130k"};
+    static const double limit_ms[N_CASE] = {0.25, 3, 0.25, 3};
     const double machine[2] = {measure_triad(), measure_fma()};
     TABLE_ROW(r, VALUE("steps", N_STEP), VALUE("triad_GB_s", machine[0]), VALUE("fma_GFLOP_s", machine[1]));
-    pal_table_note(r, "one thread, medians of %d steps; this machine: triad %.1f GB/s, multiply-add %.1f GFLOP/s",
+    pal_table_note(r,
+                   "one thread and times as fast on 2, medians of %d steps; this machine: triad %.1f GB/s, "
+                   "multiply-add %.1f GFLOP/s",
                    N_STEP, machine[0], machine[1]);
     pal_table_list(r, "cases");
     pal_err err = PAL_ERR_OK;
     for (int k = 0; k < N_CASE && !err; k++) {
         pal_prepared mesh = {0};
-        err = k < 2 ? bench_box(box[k], 0.006, &mesh, diag) : make_organ(&mesh, diag);
+        err = k < 2 ? bench_box(box[k], 0.006, &mesh, diag)
+                    : make_organ(k == 2 ? 50000 : 500000, k == 2 ? 13000 : 130000, &mesh, diag);
         if (!err) err = run_case(name[k], &mesh, limit_ms[k], machine, r, diag);
         pal_prepared_free(&mesh);
     }

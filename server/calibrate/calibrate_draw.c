@@ -156,8 +156,8 @@ static void skin_shape(drawing *d, int which)
 {
     const pal_tets *t = &d->mesh->tets;
     for (int i = 0; i < 3 * d->n_node; i++) d->node_x[i] = t->x[i] + d->node_u[which][i];
-    pal_skin_frames(&d->mesh->skin, d->node_x, d->frames);
-    pal_skin_evaluate(&d->mesh->skin, d->node_x, d->frames, d->shown);
+    pal_skin_frames(&d->mesh->skin, d->node_x, NULL, d->frames);
+    pal_skin_evaluate(&d->mesh->skin, d->frames, NULL, d->shown);
     for (int i = 0; i < 3 * d->n_vertex; i++) d->x[which][i] = (double)d->shown[i];
     for (int i = 0; i < d->n_node; i++) d->value[i] = pal_dist3(d->node_u[which] + 3 * i, d->node_u[TRUTH] + 3 * i);
     skin_value(d, d->value, d->distance[which]);

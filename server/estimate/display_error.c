@@ -22,8 +22,8 @@ static pal_err make(pal_display_error *s)
 static void show(pal_display_error *s, const double *x, float *out)
 {
     memset(s->frames, 0, pal_skin_frames_bytes(&s->mesh->skin));
-    pal_skin_frames(&s->mesh->skin, x, s->frames);
-    pal_skin_evaluate(&s->mesh->skin, x, s->frames, out);
+    pal_skin_frames(&s->mesh->skin, x, NULL, s->frames);
+    pal_skin_evaluate(&s->mesh->skin, s->frames, NULL, out);
 }
 
 pal_err pal_display_error_make(const pal_rest_solution *fine, const pal_rest_solution *coarse,

@@ -27,8 +27,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
         float *out = malloc((size_t)p.skin.n_vertex * 12 + 1);
         void *frames = calloc(p.skin.n_frame ? (size_t)p.skin.n_frame : 1, 64);
         if (out && frames) {
-            pal_skin_frames(&p.skin, x, frames);
-            pal_skin_evaluate(&p.skin, x, frames, out);
+            pal_skin_frames(&p.skin, x, NULL, frames);
+            pal_skin_evaluate(&p.skin, frames, NULL, out);
         }
         free(out);
         free(frames);

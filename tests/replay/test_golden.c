@@ -1,9 +1,13 @@
 /* Golden hashes of four scenes: the same bits from every compiler, optimization level and thread count on IEEE
  * doubles. A change of a hash means that the answer of a step has changed: say why in the commit that changes it. */
+#include "server/sim/core/tuning.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 #include "tests/fixtures/adaptive_worlds.h"
 #include "tests/fixtures/boxes.h"
+
+/* scenes run with one thread to this many */
+enum { THREADS = 3 };
 
 static pal_diagnostic diag;
 
@@ -42,10 +46,30 @@ static void pull_and_stiffen(pal_world *world, int tick)
 
 static void a_pulled_and_stiffened_block_has_its_golden_hash(void)
 {
-    pal_prepared box;
-    REQUIRE(!box_make(6, 4, 4, 0.01, &box));
-    pal_scene *scene = box_scene(&box, true, true);
-    CHECK(run(&box, scene, pull_and_stiffen, 120) == 0xe9e4502e912143ceu);
+    for (int threads = 1; threads <= THREADS; threads++) {
+        pal_prepared box;
+        REQUIRE(!box_make(6, 4, 4, 0.01, &box));
+        pal_scene *scene = box_scene(&box, true, true);
+        scene->threads = threads;
+        CHECK(run(&box, scene, pull_and_stiffen, 120) == 0xe9e4502e912143ceu);
+    }
+}
+
+/* a block with nodes enough for every thread sags */
+static void a_large_block_has_the_same_hash_with_any_number_of_threads(void)
+{
+    static const int n[3] = {16, 12, 10};
+    uint64_t first = 0;
+    for (int threads = 1; threads <= THREADS; threads++) {
+        pal_prepared box;
+        REQUIRE(!box_make(n[0], n[1], n[2], 0.01, &box));
+        CHECK_LE(THREADS * PAL_PART_NODES, box.tets.n_node);
+        pal_scene *scene = box_scene(&box, true, true);
+        scene->threads = threads;
+        const uint64_t hash = run(&box, scene, pull_and_stiffen, 5);
+        if (threads == 1) first = hash;
+        CHECK(hash != 0 && hash == first);
+    }
 }
 
 /* a body collapsed into a point that springs open, and beside it a free one that tumbles without drag */
@@ -66,12 +90,14 @@ static void a_collapsed_and_a_tumbling_body_have_their_golden_hash(void)
 {
     /* springs alone open again by their weight, and without it by their recovery */
     static const uint64_t golden[] = {0x75cfd6c9bd424b85u, 0xcdb3f0a0d631e1dfu};
-    for (int recover = 0; recover < 2; recover++) {
+    for (int k = 0; k < 2 * THREADS; k++) {
+        const int recover = k % 2;
         pal_prepared box;
         REQUIRE(!box_make(4, 3, 3, 0.01, &box));
         pal_scene *scene = box_scene(&box, true, !recover);
         pal_entry_put_number(&scene->body[0].model, "c_area_Js", 1e-7, NULL);
         if (!recover) pal_entry_put_bool(&scene->body[0].model, "recover", false, NULL);
+        scene->threads = 1 + k / 2;
         scene->n_body = 2;
         pal_body_default(&scene->body[1], "other", &box);
         scene->body[1].output.name[0] = 0;
@@ -92,7 +118,7 @@ static void press_and_grasp(pal_world *world, int tick)
     pal_world_pose(world, 1, tick < 70 ? &pull : NULL);
 }
 
-static void a_pressed_and_grasped_block_has_its_golden_hash(void)
+static void press_and_grasp_block(int threads)
 {
     pal_prepared box;
     REQUIRE(!box_make(4, 3, 3, 0.01, &box));
@@ -103,12 +129,18 @@ static void a_pressed_and_grasped_block_has_its_golden_hash(void)
     pal_entry_init(&def->effect[def->n_effect++], "effects[3]", "tool_grasp");
     pal_tools_default(scene, 2);
     scene->tool[0].radius_m = scene->tool[1].radius_m = 0.006;
+    scene->threads = threads;
     CHECK(run(&box, scene, press_and_grasp, 100) == 0x0491b604d7845c08u);
+}
+
+static void a_pressed_and_grasped_block_has_its_golden_hash(void)
+{
+    for (int threads = 1; threads <= THREADS; threads++) press_and_grasp_block(threads);
 }
 
 /* our stomach, held at one end, on three levels: pressed at the front and grabbed beside it, both let go; levels come
  * and go */
-static void a_pressed_and_grasped_stomach_that_adapts_has_its_golden_hash(void)
+static void press_and_grasp_stomach(int threads)
 {
     pal_stomach stomach;
     REQUIRE(!pal_stomach_make(&stomach));
@@ -129,6 +161,7 @@ static void a_pressed_and_grasped_stomach_that_adapts_has_its_golden_hash(void)
     shell_scene_effect(&s, "tool_grasp");
     pal_tools_default(s.scene, 2);
     s.scene->tool[0].radius_m = s.scene->tool[1].radius_m = 0.015;
+    s.scene->threads = threads;
     REQUIRE(shell_scene_start(&s));
     const uint64_t start = pal_world_hash(s.world);
     for (int i = 0; i < 90; i++) {
@@ -149,10 +182,17 @@ static void a_pressed_and_grasped_stomach_that_adapts_has_its_golden_hash(void)
     shell_scene_close(&s);
 }
 
+static void a_pressed_and_grasped_stomach_that_adapts_has_its_golden_hash(void)
+{
+    press_and_grasp_stomach(1);
+    press_and_grasp_stomach(THREADS);
+}
+
 int main(void)
 {
     RUN(a_pressed_and_grasped_stomach_that_adapts_has_its_golden_hash);
     RUN(a_pulled_and_stiffened_block_has_its_golden_hash);
+    RUN(a_large_block_has_the_same_hash_with_any_number_of_threads);
     RUN(a_collapsed_and_a_tumbling_body_have_their_golden_hash);
     RUN(a_pressed_and_grasped_block_has_its_golden_hash);
     return check_report();

@@ -13,6 +13,9 @@
 /* distance to a node, in voxel edges, at which a vertex lies on it */
 #define ON_NODE 1e-7
 
+/* frames and vertices of a piece of work of a thread: some ten microseconds */
+enum { SKIN_FRAMES = 128, SKIN_VERTICES = 1024 };
+
 typedef float column __attribute__((vector_size(16), aligned(4)));
 
 void pal_skin_free(pal_skin *skin)
@@ -195,7 +198,7 @@ static pal_err store_offsets(const pal_tets *tets, const double *x, pal_skin *sk
 {
     float *frames = calloc(skin->n_frame ? (size_t)skin->n_frame : 1, 64);
     if (!frames) return PAL_ERR_MEMORY;
-    pal_skin_frames(skin, tets->x, frames);
+    pal_skin_frames(skin, tets->x, NULL, frames);
     for (size_t v = 0; v < (size_t)skin->n_vertex; v++)
         for (size_t k = 0; k < PAL_SKIN_NEIGHBOURS; k++) {
             int32_t f = skin->near[PAL_SKIN_NEIGHBOURS * v + k];
@@ -251,20 +254,39 @@ static void frame_edge(const pal_skin *skin, size_t f, const double *x, const do
 static void update_frame(const pal_skin *skin, size_t f, const double *x, float *frames)
 {
     double X[3], Y[3], Z[3];
+    const double *o = x + 3 * (size_t)skin->frame[f];
+    float *to = frames + 16 * f;
     int32_t a = skin->fan_start[f], n = skin->fan_start[f + 1] - a;
+    for (int k = 0; k < 3; k++) to[12 + k] = (float)o[k];
     fan_normal(x, skin->frame[f], skin->fan + 2 * (size_t)a, n, X);
     unit_or_less(X, (double)skin->frame_rest[3 * f]);
     frame_edge(skin, f, x, X, Y);
     pal_cross3(Z, X, Y);
     double sum = X[0] + X[1] + X[2] + Y[0] + Y[1] + Y[2];
     if (!(fabs(sum) < 1e30)) return;
-    float *to = frames + 16 * f;
     for (int k = 0; k < 3; k++) to[k] = (float)X[k], to[4 + k] = (float)Y[k], to[8 + k] = (float)Z[k];
 }
 
-void pal_skin_frames(const pal_skin *skin, const double *x, void *frames)
+typedef struct pass {
+    const pal_skin *skin;
+    const double *x;
+    float *frames;           /* written by update_frames */
+    const float *shown_from; /* frames that evaluate_vertices reads */
+    float *out;
+} pass;
+
+static void update_frames(void *user, int worker, int index)
 {
-    for (size_t f = 0; f < (size_t)skin->n_frame; f++) update_frame(skin, f, x, frames);
+    const pass *p = user;
+    const int first = index * SKIN_FRAMES, end = first + SKIN_FRAMES;
+    (void)worker;
+    for (int f = first; f < end && f < p->skin->n_frame; f++) update_frame(p->skin, (size_t)f, p->x, p->frames);
+}
+
+void pal_skin_frames(const pal_skin *skin, const double *x, pal_team *team, void *frames)
+{
+    pass p = {.skin = skin, .x = x, .frames = frames};
+    pal_team_run(team, (skin->n_frame + SKIN_FRAMES - 1) / SKIN_FRAMES, update_frames, &p);
 }
 
 void pal_skin_frames_of(const pal_skin *skin, const double *x, const int32_t *list, int n, void *frames)
@@ -272,27 +294,32 @@ void pal_skin_frames_of(const pal_skin *skin, const double *x, const int32_t *li
     for (int i = 0; i < n; i++) update_frame(skin, (size_t)list[i], x, frames);
 }
 
-void pal_skin_evaluate(const pal_skin *skin, const double *x, void *frames, float *out)
+static void evaluate_vertices(void *user, int worker, int index)
 {
-    for (size_t f = 0; f < (size_t)skin->n_frame; f++) {
-        float *to = (float *)frames + 16 * f + 12;
-        const double *o = x + 3 * (size_t)skin->frame[f];
-        to[0] = (float)o[0], to[1] = (float)o[1], to[2] = (float)o[2];
-    }
-    for (size_t v = 0; v < (size_t)skin->n_vertex; v++) {
-        const int32_t *near = skin->near + PAL_SKIN_NEIGHBOURS * v;
-        const float *c = skin->coef + 4 * PAL_SKIN_NEIGHBOURS * v;
+    const pass *p = user;
+    const size_t first = (size_t)index * SKIN_VERTICES, n = (size_t)p->skin->n_vertex;
+    const size_t end = first + SKIN_VERTICES < n ? first + SKIN_VERTICES : n;
+    (void)worker;
+    for (size_t v = first; v < end; v++) {
+        const int32_t *near = p->skin->near + PAL_SKIN_NEIGHBOURS * v;
+        const float *c = p->skin->coef + 4 * PAL_SKIN_NEIGHBOURS * v;
         column X = {0}, Y = {0}, Z = {0}, P = {0};
         for (int k = 0; k < PAL_SKIN_NEIGHBOURS; k++, c += 4) {
-            const column *axes = (const column *)((const float *)frames + 16 * (size_t)near[k]);
+            const column *axes = (const column *)(p->shown_from + 16 * (size_t)near[k]);
             X += axes[0] * c[0];
             Y += axes[1] * c[1];
             Z += axes[2] * c[2];
             P += axes[3] * c[3];
         }
         P += X + Y + Z;
-        out[3 * v] = P[0], out[3 * v + 1] = P[1], out[3 * v + 2] = P[2];
+        p->out[3 * v] = P[0], p->out[3 * v + 1] = P[1], p->out[3 * v + 2] = P[2];
     }
+}
+
+void pal_skin_evaluate(const pal_skin *skin, const void *frames, pal_team *team, float *out)
+{
+    pass p = {.skin = skin, .shown_from = frames, .out = out};
+    pal_team_run(team, (skin->n_vertex + SKIN_VERTICES - 1) / SKIN_VERTICES, evaluate_vertices, &p);
 }
 
 void pal_skin_vertex(const pal_skin *skin, const double *x, const void *frames, int vertex, double out[3])

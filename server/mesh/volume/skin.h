@@ -6,6 +6,7 @@
  * frames buffer. */
 #ifndef PAL_MESH_VOLUME_SKIN_H
 #define PAL_MESH_VOLUME_SKIN_H
+#include "server/base/team.h"
 #include "server/mesh/geometry/surface.h"
 #include "server/mesh/geometry/tets.h"
 
@@ -39,12 +40,13 @@ static inline size_t pal_skin_frames_bytes(const pal_skin *skin)
 {
     return (size_t)skin->n_frame * 64;
 }
-/* axes from node positions x [n_node][3]; a frame whose nodes are not finite keeps what the buffer holds. [sim] */
-void pal_skin_frames(const pal_skin *skin, const double *x, void *frames);
+/* axes and origins from node positions x [n_node][3]; a frame whose nodes are not finite keeps the axes that the buffer
+ * holds. team: NULL, or threads that share the work; the same bits with any number. [sim] */
+void pal_skin_frames(const pal_skin *skin, const double *x, pal_team *team, void *frames);
 /* the same for the n frames of list only [sim] */
 void pal_skin_frames_of(const pal_skin *skin, const double *x, const int32_t *list, int n, void *frames);
-/* all shown vertices: out [n_vertex][3] float metres; writes the nodes' positions into frames. [sim] */
-void pal_skin_evaluate(const pal_skin *skin, const double *x, void *frames, float *out);
+/* all shown vertices from all frames: out [n_vertex][3] float metres; team as above. [sim] */
+void pal_skin_evaluate(const pal_skin *skin, const void *frames, pal_team *team, float *out);
 /* one shown vertex. [sim] */
 void pal_skin_vertex(const pal_skin *skin, const double *x, const void *frames, int vertex, double out[3]);
 #endif

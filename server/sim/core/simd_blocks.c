@@ -2,6 +2,7 @@
 #include "server/sim/core/simd_blocks.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/core/tuning.h"
 
 #include <limits.h>
 #include <math.h>
@@ -319,4 +320,134 @@ void pal_block_rounds_run(const pal_block_rounds *rounds, pal_team *team, void (
         round_pass pass = {.piece = piece, .user = user, .first = rounds->part[k]};
         pal_team_run(team, rounds->part[k + 1] - rounds->part[k], run_part, &pass);
     }
+}
+
+/* ---- parts of a divided order ---- */
+
+pal_err pal_node_order_divide(pal_node_order *node_order, int n_part, pal_arena *arena)
+{
+    if (n_part > node_order->n_node) n_part = node_order->n_node;
+    node_order->part = PAL_NEW(arena, pal_node_order, n_part);
+    if (!node_order->part) return PAL_ERR_MEMORY;
+    for (int p = 0; p < n_part; p++) {
+        node_order->part[p] = *node_order;
+        if (!PAL_NEW_DOUBLES(arena, 3 * (size_t)node_order->n_slot, &node_order->part[p].x, &node_order->part[p].f))
+            return PAL_ERR_MEMORY;
+    }
+    node_order->n_part = n_part;
+    return PAL_ERR_OK;
+}
+
+static int part_of(const pal_node_order *order, int node)
+{
+    int part = (int)((int64_t)node * order->n_part / order->n_node);
+    while (node >= pal_part_first(order->n_node, order->n_part, part + 1)) part++;
+    return part;
+}
+
+/* node_of [n_slot]: -1 where there is none. Nodes of a block, -1 where a lane has an empty slot; returns how many */
+static int block_nodes(const pal_simd_blocks *blocks, int b, const int32_t *node_of, int32_t *node)
+{
+    const int n = blocks->n_corner * PAL_LANES;
+    for (int i = 0; i < n; i++) {
+        const bool strip = b < blocks->n_strip;
+        node[i] = node_of[strip ? blocks->base[blocks->n_corner * b + i / PAL_LANES] + i % PAL_LANES
+                                : blocks->node[(size_t)(b - blocks->n_strip) * (size_t)n + (size_t)i]];
+    }
+    return n;
+}
+
+/* What finds the lists of the parts, once to count, once to fill. seen [n_node]: the last part whose `other` has it */
+typedef struct part_search {
+    const pal_simd_blocks *blocks;
+    const pal_node_order *order;
+    int32_t *node_of, *seen;
+} part_search;
+
+/* lists of one part from n_block and n_other on, which grow; block and other NULL: counted only */
+static void find_part(const part_search *s, int part, int32_t *block, int32_t *other, int *n_block, int *n_other)
+{
+    for (int b = 0; b < s->blocks->n_lane / PAL_LANES; b++) {
+        int32_t node[PAL_SIMD_CORNERS_MAX * PAL_LANES];
+        const int n = block_nodes(s->blocks, b, s->node_of, node);
+        bool touched = false;
+        for (int i = 0; i < n && !touched; i++) touched = node[i] >= 0 && part_of(s->order, node[i]) == part;
+        if (!touched) continue;
+        if (block) block[*n_block] = b;
+        ++*n_block;
+        for (int i = 0; i < n; i++) {
+            if (node[i] < 0 || s->seen[node[i]] == part || part_of(s->order, node[i]) == part) continue;
+            s->seen[node[i]] = part;
+            if (other) other[*n_other] = node[i];
+            ++*n_other;
+        }
+    }
+}
+
+/* to counts the entries of both lists; returns the blocks of the largest part */
+static int find_parts(const part_search *s, pal_part_blocks *out, int n[2])
+{
+    int max = 0;
+    n[0] = n[1] = 0;
+    for (int i = 0; i < s->order->n_node; i++) s->seen[i] = -1;
+    for (int part = 0; part < s->order->n_part; part++) {
+        const int before = n[0];
+        find_part(s, part, out->block, out->other, &n[0], &n[1]);
+        if (out->first) out->first[part + 1] = n[0], out->other_first[part + 1] = n[1];
+        max = n[0] - before > max ? n[0] - before : max;
+    }
+    return max;
+}
+
+pal_err pal_part_blocks_make(const pal_simd_blocks *blocks, const pal_node_order *node_order, pal_arena *arena,
+                             pal_part_blocks *out)
+{
+    int n[2];
+    *out = (pal_part_blocks){0};
+    if (node_order->n_part < 2) return PAL_ERR_OK;
+    part_search s = {.blocks = blocks, .order = node_order};
+    s.node_of = malloc(sizeof *s.node_of * (size_t)node_order->n_slot);
+    s.seen = malloc(sizeof *s.seen * (size_t)node_order->n_node);
+    pal_err err = s.node_of && s.seen ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    for (int i = 0; i < node_order->n_slot && !err; i++) s.node_of[i] = -1;
+    for (int i = 0; i < node_order->n_node && !err; i++) s.node_of[node_order->slot[i]] = i;
+    if (!err && find_parts(&s, out, n) <= PAL_PART_MAX * blocks->n_lane / PAL_LANES) {
+        pal_part_blocks made = {.first = PAL_NEW(arena, int32_t, node_order->n_part + 1),
+                                .block = PAL_NEW(arena, int32_t, n[0]),
+                                .other_first = PAL_NEW(arena, int32_t, node_order->n_part + 1),
+                                .other = PAL_NEW(arena, int32_t, n[1])};
+        err = made.first && made.block && made.other_first && made.other ? PAL_ERR_OK : PAL_ERR_MEMORY;
+        if (!err) *out = made, (void)find_parts(&s, out, n);
+    }
+    free(s.node_of), free(s.seen);
+    return err;
+}
+
+PAL_INLINE void load_node(const pal_node_order *part, int i, const double *x)
+{
+    double *to = part->x + part->slot[i];
+    for (int d = 0; d < 3; d++) to[d * part->n_slot] = x[3 * i + d];
+}
+
+void pal_part_load(const pal_part_blocks *blocks, const pal_node_order *node_order, int part, const double *x)
+{
+    const pal_node_order own = node_order->part[part];
+    const int end = pal_part_first(own.n_node, node_order->n_part, part + 1);
+    for (int i = pal_part_first(own.n_node, node_order->n_part, part); i < end; i++) load_node(&own, i, x);
+    for (int k = blocks->other_first[part]; k < blocks->other_first[part + 1]; k++)
+        load_node(&own, blocks->other[k], x);
+}
+
+void pal_part_add(const pal_part_blocks *blocks, const pal_node_order *node_order, int part, double *force)
+{
+    const pal_node_order own = node_order->part[part];
+    const int end = pal_part_first(own.n_node, node_order->n_part, part + 1);
+    for (int i = pal_part_first(own.n_node, node_order->n_part, part); i < end; i++)
+        for (int d = 0; d < 3; d++) {
+            double *from = own.f + own.slot[i] + d * own.n_slot;
+            force[3 * i + d] += *from;
+            *from = 0;
+        }
+    for (int k = blocks->other_first[part]; k < blocks->other_first[part + 1]; k++)
+        for (int d = 0; d < 3; d++) own.f[own.slot[blocks->other[k]] + d * own.n_slot] = 0;
 }

@@ -19,10 +19,12 @@ enum { PAL_LANES = 8, PAL_CORNERS = 4, PAL_SIMD_CORNERS_MAX = 8 };
 /* slots of a body's nodes, and working arrays that its components use in turn */
 typedef struct pal_node_order {
     int n_node, n_slot;
-    int32_t *slot;  /* of each node                                        [n_node]    */
-    double *x;      /* positions by slot, 0 in empty ones; x, y, z          [3][n_slot] */
-    double *f;      /* forces by slot, zero between runs                    [3][n_slot] */
-    pal_team *team; /* threads that share passes over nodes and blocks; NULL: the caller's alone */
+    int32_t *slot;               /* of each node                                        [n_node]    */
+    double *x;                   /* positions by slot, 0 in empty ones; x, y, z          [3][n_slot] */
+    double *f;                   /* forces by slot, zero between runs                    [3][n_slot] */
+    pal_team *team;              /* threads that share passes over nodes and blocks; NULL: the caller's alone */
+    int n_part;                  /* of an order that is divided between threads (pal_node_order_divide), else 0 */
+    struct pal_node_order *part; /* the same slots with x and f of their own                        [n_part] */
 } pal_node_order;
 
 /* the blocks of one component */
@@ -47,6 +49,18 @@ typedef struct pal_block_rounds {
     int32_t *order; /* blocks                          [n_block]         */
 } pal_block_rounds;
 
+/* The blocks of each part of a divided order, for several threads: the owner of a node computes. A part evaluates every
+ * block that touches one of its nodes, in arrays of its own, and takes the sums at its own nodes; blocks at a border
+ * are evaluated by each part that they touch. Parts run side by side, and a node receives the same terms in the same
+ * order as by one thread that runs through all blocks, so that the bits are the same for any number of parts. For
+ * kernels that are cheap beside what a round of pal_block_rounds costs, and change nothing but forces. */
+typedef struct pal_part_blocks {
+    int32_t *first;       /* first block of each part; NULL: not made                  [n_part + 1]           */
+    int32_t *block;       /* ascending in a part                                       [first[n_part]]        */
+    int32_t *other_first; /* first of `other` of each part                             [n_part + 1]           */
+    int32_t *other;       /* nodes of other parts that the part's blocks touch         [other_first[n_part]]  */
+} pal_part_blocks;
+
 pal_err pal_node_order_make(const double *x_rest, int n_node, double edge_m, pal_arena *arena, pal_node_order **out);
 /* item [n_item][n_corner] nodes, sorts the corners of each item by their slots; MEMORY */
 pal_err pal_simd_blocks_make(const pal_node_order *node_order, int32_t *item, int n_item, int n_corner,
@@ -60,6 +74,26 @@ pal_err pal_block_rounds_make(const pal_simd_blocks *blocks, const pal_node_orde
 /* calls piece(user, part) for every part, round by round; team may be NULL */
 void pal_block_rounds_run(const pal_block_rounds *rounds, pal_team *team, void (*piece)(void *user, int part),
                           void *user);
+/* Divides the nodes into at most n_part parts of successive ones, about as many in each; passes over nodes then have as
+ * many pieces, so that the memory of a node stays with one thread. MEMORY */
+pal_err pal_node_order_divide(pal_node_order *node_order, int n_part, pal_arena *arena);
+/* parts of an order: 1 where it is not divided or NULL; first node of a part, for part n_part the number of nodes */
+static inline int pal_node_order_parts(const pal_node_order *node_order)
+{
+    return node_order && node_order->n_part > 0 ? node_order->n_part : 1;
+}
+static inline int pal_part_first(int n_node, int n_part, int part)
+{
+    return (int)((int64_t)n_node * part / n_part);
+}
+/* Makes nothing where the order is not divided, or where the largest part would have so many of the blocks that threads
+ * would repeat each other's work (PAL_PART_MAX); MEMORY */
+pal_err pal_part_blocks_make(const pal_simd_blocks *blocks, const pal_node_order *node_order, pal_arena *arena,
+                             pal_part_blocks *out);
+/* positions x [n_node][3] to the arrays of a part, as far as its blocks read them; force [n_node][3] += the forces at
+ * the part's own nodes, and the arrays are zero afterwards */
+void pal_part_load(const pal_part_blocks *blocks, const pal_node_order *node_order, int part, const double *x);
+void pal_part_add(const pal_part_blocks *blocks, const pal_node_order *node_order, int part, double *force);
 /* node_order->x = positions x [n_node][3] */
 void pal_node_order_load(pal_node_order *node_order, const double *x);
 /* force [n_node][3] += node_order->f, which is zero afterwards */

@@ -18,10 +18,10 @@ static inline double pal_guard_max_move_m(const pal_body *body)
     return PAL_GUARD_MOVE * body->length_scale_m;
 }
 /* the factor that keeps a move within max_m; less than 1 is counted */
-static inline double pal_guard_shorten(pal_body *body, double move_m, double max_m)
+static inline double pal_guard_shorten(double move_m, double max_m, uint64_t *n_clamped)
 {
     if (!(move_m > max_m)) return 1;
-    body->safeguards.n_clamped++;
+    ++*n_clamped;
     return max_m / move_m;
 }
 /* false: a position or velocity is not finite, and the body is frozen with its reason */

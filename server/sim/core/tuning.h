@@ -67,4 +67,14 @@ enum { PAL_SPRING_GRID_NODES_MAX = 1 << 20 };
  * nodes have the same limit of the sub-step where Poisson's ratio is 0.45; 0.25, as elsewhere, takes 1.25 times as many
  * sub-steps (tests/sim/springs/test_springs.c) */
 #define PAL_OWN_CORNER_MASS 0.4
+/* ---- threads ---- */
+
+/* part of all blocks that the largest part of a divided order may have to evaluate: with more, threads repeat each
+ * other's blocks instead of sharing them, as on a mesh whose nodes are in no order (tests/sim/core/test_simd_blocks.c)
+ */
+#define PAL_PART_MAX 0.8
+/* nodes of a body of springs for each of its threads: with fewer, waiting for each other costs what they save
+ * (`palpate bench springs`: two threads take 0.9 of the time of one from 1,700 nodes on, 1.1 at 800;
+ * tests/replay/test_golden.c has a body with more) */
+enum { PAL_PART_NODES = 750 };
 #endif

@@ -81,15 +81,14 @@ static void reopen(const pal_spring_set *set, const pal_body *body)
     }
 }
 
+PAL_SPRING_FORCES(2)
+
 static pal_err run(void *self, pal_step *step)
 {
     const edge_distance *e = self;
     pal_body *body = step->body;
     spring_select(self, body);
-    pal_node_order_load(body->node_order, body->d);
-    double min = pal_spring_run(&e->set, body->node_order, kernel, 2);
-    pal_node_order_add(body->node_order, body->f);
-    if (min < PAL_ROUNDING * PAL_ROUNDING) reopen(&e->set, body);
+    if (spring_forces(&e->set, body) < PAL_ROUNDING * PAL_ROUNDING) reopen(&e->set, body);
     if (e->set.spring.c_Js > 0) pal_spring_damp(&e->set, body, PAL_SPRING_DISTANCE);
     return PAL_ERR_OK;
 }

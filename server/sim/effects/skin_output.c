@@ -12,8 +12,8 @@ static size_t axes_count(const pal_skin *skin)
 
 static void evaluate(pal_body *body)
 {
-    pal_skin_frames(body->display.skin, body->d, body->display.skin_axes);
-    pal_skin_evaluate(body->display.skin, body->d, body->display.skin_axes, body->display.shown);
+    pal_skin_frames(body->display.skin, body->d, body->team, body->display.skin_axes);
+    pal_skin_evaluate(body->display.skin, body->display.skin_axes, body->team, body->display.shown);
 }
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)

@@ -17,16 +17,50 @@ static inline void spring_destroy(void *self)
     pal_spring_lattice_leave(self);
 }
 
+typedef struct spring_pass {
+    const pal_spring_set *set;
+    pal_body *body;
+    double min[PAL_TEAM_MAX]; /* that the kernel reports, of each part */
+} spring_pass;
+
+/* spring_forces: body->f += the forces of all springs, by the threads of the team in parts where there are any; returns
+ * the minimum that the kernel reports, at most 1 */
+#define PAL_SPRING_FORCES(N_CORNER)                                                                                    \
+    static void spring_part(void *user, int worker, int part)                                                          \
+    {                                                                                                                  \
+        spring_pass *pass = user;                                                                                      \
+        const pal_part_blocks parts = pass->set->part_blocks;                                                          \
+        const pal_node_order *order = pass->body->node_order;                                                          \
+        const int first = parts.first[part], n = parts.first[part + 1] - first;                                        \
+        (void)worker;                                                                                                  \
+        pal_part_load(&parts, order, part, pass->body->d);                                                             \
+        pass->min[part] = pal_spring_run(pass->set, &order->part[part], parts.block + first, n, kernel, N_CORNER);     \
+        pal_part_add(&parts, order, part, pass->body->f);                                                              \
+    }                                                                                                                  \
+    static double spring_forces(const pal_spring_set *set, pal_body *body)                                             \
+    {                                                                                                                  \
+        pal_node_order *order = body->node_order;                                                                      \
+        double min = 1;                                                                                                \
+        if (set->part_blocks.first) {                                                                                  \
+            spring_pass pass = {.set = set, .body = body};                                                             \
+            pal_team_run(body->team, order->n_part, spring_part, &pass);                                               \
+            for (int p = 0; p < order->n_part; p++) min = pass.min[p] < min ? pass.min[p] : min;                       \
+            return min;                                                                                                \
+        }                                                                                                              \
+        pal_node_order_load(order, body->d);                                                                           \
+        min = pal_spring_run(set, order, NULL, set->simd_blocks.n_lane / PAL_LANES, kernel, N_CORNER);                 \
+        pal_node_order_add(order, body->f);                                                                            \
+        return min;                                                                                                    \
+    }
+
 #define PAL_SPRING_MEMBERS(KIND, N_CORNER)                                                                             \
+    PAL_SPRING_FORCES(N_CORNER)                                                                                        \
     static pal_err spring_run(void *self, pal_step *step)                                                              \
     {                                                                                                                  \
         const pal_spring_set *set = self;                                                                              \
-        pal_body *body = step->body;                                                                                   \
-        spring_select(self, body);                                                                                     \
-        pal_node_order_load(body->node_order, body->d);                                                                \
-        pal_spring_run(set, body->node_order, kernel, N_CORNER);                                                       \
-        pal_node_order_add(body->node_order, body->f);                                                                 \
-        if (set->spring.c_Js > 0) pal_spring_damp(set, body, KIND);                                                    \
+        spring_select(self, step->body);                                                                               \
+        (void)spring_forces(set, step->body);                                                                          \
+        if (set->spring.c_Js > 0) pal_spring_damp(set, step->body, KIND);                                              \
         return PAL_ERR_OK;                                                                                             \
     }                                                                                                                  \
     static double spring_energy(void *self, const pal_body *body)                                                      \

@@ -13,6 +13,7 @@
  * same moduli without area springs, in about half the time. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
+#include "server/sim/core/tuning.h"
 #include "server/sim/springs/spring_lattice.h"
 
 #include <string.h>
@@ -157,7 +158,10 @@ static pal_err build(pal_config_entry *item, pal_build *build, pal_component_lis
     body->display.skin = mesh->skin.n_vertex > 0 ? &mesh->skin : NULL;
     body->edge_m = mesh->tets.edge_m;
     if (recover) PAL_TRY(pal_spring_lattice_make(body, build->arena));
-    return pal_node_order_make(body->x_rest, body->n_node, body->edge_m, build->arena, &body->node_order);
+    PAL_TRY(pal_node_order_make(body->x_rest, body->n_node, body->edge_m, build->arena, &body->node_order));
+    const int max = body->n_node / PAL_PART_NODES, threads = build->scene->threads;
+    const int n_part = threads < max ? threads : max;
+    return n_part > 1 ? pal_node_order_divide(body->node_order, n_part, build->arena) : PAL_ERR_OK;
 }
 
 const pal_model pal_model_tet_springs = {.name = "tet_springs", .build = build, .list = list};

@@ -375,7 +375,7 @@ static double move(central *solver, pal_body *body, double dt)
         non_finite += 0 * move_m;
         if (move_m > max_m) {
             uint64_t before = pal_clock_ns();
-            pal_scale3(v, pal_guard_shorten(body, move_m, max_m), v);
+            pal_scale3(v, pal_guard_shorten(move_m, max_m, &body->safeguards.n_clamped), v);
             body->safeguards.ns += pal_clock_ns() - before;
         }
         pal_axpy3(body->x + 3 * (size_t)i, dt, v);

@@ -9,6 +9,7 @@
  * Changes of added mass would add energy, so such a node loses up to a hundredth of its velocity per sub-step.
  * Components check for inverted elements whenever the bound is computed, and in every step while there are any. */
 #include "server/base/clock.h"
+#include "server/base/team.h"
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/core/step_guard.h"
@@ -16,15 +17,22 @@
 
 #include <string.h>
 
+/* what a part of the nodes has come to in a sub-step */
+typedef struct part_result {
+    double max2, non_finite; /* largest v^2, m^2/s^2; 0, or NaN where one is not finite */
+    uint64_t n_clamped, ns;  /* nodes whose move was shortened, and the time that took  */
+} part_result;
+
 typedef struct verlet {
     double *stiff, *damp; /* Gershgorin row sums, N/m and Ns/m [n_dof] */
     double safety;        /* of the stability limit             */
     double limit_s;
-    double moved_m;     /* upper bound of motion since the bound was computed */
-    double last_m;      /* of that, in the last sub-step                       */
-    int n_since;        /* sub-steps since then                                */
-    bool known;         /* limit_s holds                                       */
-    bool has_inversion; /* bounds must be computed again in the coming step */
+    double moved_m;      /* upper bound of motion since the bound was computed */
+    double last_m;       /* of that, in the last sub-step                       */
+    part_result *result; /* of the last sub-step                              [n_part] */
+    int n_since;         /* sub-steps since then                                */
+    bool known;          /* limit_s holds                                       */
+    bool has_inversion;  /* bounds must be computed again in the coming step */
 } verlet;
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
@@ -35,6 +43,8 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     verlet *solver = PAL_NEW(build->arena, verlet, 1);
     if (!solver) return PAL_ERR_MEMORY;
     if (!PAL_NEW_DOUBLES(build->arena, build->body->n_dof, &solver->stiff, &solver->damp)) return PAL_ERR_MEMORY;
+    solver->result = PAL_NEW(build->arena, part_result, pal_node_order_parts(build->body->node_order));
+    if (!solver->result) return PAL_ERR_MEMORY;
     solver->safety = safety;
     *self = solver;
     return PAL_ERR_OK;
@@ -71,22 +81,26 @@ static double limit(void *self, pal_step *step)
     return solver->limit_s;
 }
 
-static pal_err run(void *self, pal_step *step)
-{
-    verlet *solver = self;
-    pal_body *body = step->body;
-    double dt = step->dt_s, keep = 1 / (1 + dt * pal_guard_drag_1_s(step->force, step->n_force)), max2 = 0,
-           non_finite = 0;
-    double root = dt / (2 * solver->safety);
-    step->drag_separate = true;
-    PAL_TRY(pal_assemble_forces(step));
+typedef struct pass {
+    verlet *solver;
+    pal_body *body;
+    double dt, keep, max_m; /* keep: by drag, of a velocity; max_m: of a node */
+    bool adds_mass;
+    int n_part;
+} pass;
 
-    /* velocities */
-    for (int i = 0; i < body->n_dof; i++) {
+/* new velocities of nodes; largest of their squares, and 0 or NaN */
+static void push_nodes(const pass *p, int first, int end, part_result *out)
+{
+    const verlet *solver = p->solver;
+    const pal_body *body = p->body;
+    const double dt = p->dt, root = dt / (2 * solver->safety);
+    double max2 = 0, non_finite = 0;
+    for (int i = first; i < end; i++) {
         double *v = body->v + 3 * i, m = body->mass_kg[i];
         const double *g = body->g + 3 * i;
-        double s = body->support[i] ? 0 : dt / m, k = !body->support[i] ? keep : body->support[i] == 2 ? 1 : 0;
-        if (step->adds_mass && !body->support[i]) {
+        double s = body->support[i] ? 0 : dt / m, k = !body->support[i] ? p->keep : body->support[i] == 2 ? 1 : 0;
+        if (p->adds_mass && !body->support[i]) {
             double heavy = fmax(m, root * (root * solver->stiff[i] + solver->damp[i]));
             s = dt / heavy, k *= 1 - PAL_HEAVY_LOSS * (1 - m / heavy);
         }
@@ -95,22 +109,57 @@ static pal_err run(void *self, pal_step *step)
         max2 = v2 > max2 ? v2 : max2;
         non_finite += 0 * v2;
     }
-    double move_m = sqrt(max2) * dt, max = pal_guard_max_move_m(body);
-    if (move_m > max) {
+    out->max2 = max2, out->non_finite = non_finite;
+}
+
+/* velocities and positions of a part of the nodes */
+static void move_part(void *user, int worker, int part)
+{
+    const pass *p = user;
+    const pal_body *body = p->body;
+    const int first = pal_part_first(body->n_dof, p->n_part, part),
+              end = pal_part_first(body->n_dof, p->n_part, part + 1);
+    part_result made = {0};
+    (void)worker;
+    push_nodes(p, first, end, &made);
+    if (sqrt(made.max2) * p->dt > p->max_m) {
         uint64_t before = pal_clock_ns();
-        for (int i = 0; i < body->n_dof; i++) {
+        for (int i = first; i < end; i++) {
             double *v = body->v + 3 * i;
-            pal_scale3(v, pal_guard_shorten(body, pal_norm3(v) * dt, max), v);
+            pal_scale3(v, pal_guard_shorten(pal_norm3(v) * p->dt, p->max_m, &made.n_clamped), v);
         }
-        body->safeguards.ns += pal_clock_ns() - before;
+        made.ns = pal_clock_ns() - before;
     }
+    for (int i = 3 * first; i < 3 * end; i++) body->x[i] += p->dt * body->v[i];
+    p->solver->result[part] = made;
+}
+
+static pal_err run(void *self, pal_step *step)
+{
+    verlet *solver = self;
+    pal_body *body = step->body;
+    double dt = step->dt_s, max2 = 0, non_finite = 0;
+    pass p = {.solver = solver,
+              .body = body,
+              .dt = dt,
+              .keep = 1 / (1 + dt * pal_guard_drag_1_s(step->force, step->n_force)),
+              .max_m = pal_guard_max_move_m(body),
+              .adds_mass = step->adds_mass,
+              .n_part = pal_node_order_parts(body->node_order)};
+    step->drag_separate = true;
+    PAL_TRY(pal_assemble_forces(step));
+    pal_team_run(body->team, p.n_part, move_part, &p);
+    for (int i = 0; i < p.n_part; i++) {
+        const part_result *made = &solver->result[i];
+        max2 = made->max2 > max2 ? made->max2 : max2;
+        non_finite += made->non_finite;
+        body->safeguards.n_clamped += made->n_clamped, body->safeguards.ns += made->ns;
+    }
+    const double move_m = sqrt(max2) * dt;
     /* a non-finite velocity makes the displacement, and so the next limit, non-finite */
-    solver->last_m = (move_m < max ? move_m : max) + non_finite;
+    solver->last_m = (move_m < p.max_m ? move_m : p.max_m) + non_finite;
     solver->moved_m += solver->last_m;
     solver->n_since++;
-
-    /* positions */
-    for (int i = 0; i < 3 * body->n_dof; i++) body->x[i] += dt * body->v[i];
     return PAL_ERR_OK;
 }
 

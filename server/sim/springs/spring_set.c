@@ -79,6 +79,7 @@ static pal_err fill(pal_spring_set *set, const pal_build *build, double *weight)
     const pal_body *body = build->body;
     pal_arena *arena = build->arena;
     PAL_TRY(pal_simd_blocks_make(body->node_order, set->item, set->n_item, set->n_corner, arena, &set->simd_blocks));
+    PAL_TRY(pal_part_blocks_make(&set->simd_blocks, body->node_order, arena, &set->part_blocks));
     PAL_TRY(pal_spring_weights(&set->spring, body, NULL, set->item, set->n_item, set->n_corner, weight));
     pal_spring_on_grid(&set->spring, &build->def->spring_grid, body, set->item, set->n_item, set->n_corner, weight);
     set->w = PAL_NEW(arena, double, set->simd_blocks.n_lane);

@@ -20,7 +20,8 @@ typedef struct pal_spring_set {
     int n_item, n_corner;
     int32_t *item; /* nodes                                          [n_item][n_corner] */
     pal_simd_blocks simd_blocks;
-    double *w, *q; /* by lane; 0: no spring                          [n_lane]           */
+    pal_part_blocks part_blocks; /* for several threads */
+    double *w, *q;               /* by lane; 0: no spring                          [n_lane]           */
     /* with regions of other materials, q = part[0] + part[1]/E + part[2]/factor + part[3]/(E factor) of the body's E
      * and factor; whole is q without regions; NULL: no regions [n_lane] */
     double *part[4], *whole;
@@ -102,58 +103,76 @@ PAL_INLINE void pal_spring_damp(const pal_spring_set *set, const pal_body *body,
 }
 
 /* the forces f on corners 1, 2, 3 of PAL_WIDE springs to the slots `node` [n_corner][8], minus their sum on corner 0 */
-PAL_INLINE void pal_spring_add_loose(pal_node_order *node_order, const int32_t *node, int n_corner, pal_wide f[][3])
+PAL_INLINE void pal_spring_add_loose(const pal_node_order *order, const int32_t *node, int n_corner, pal_wide f[][3])
 {
     for (int c = 1; c < n_corner; c++)
         for (int l = 0; l < PAL_WIDE; l++)
             for (int d = 0; d < 3; d++) {
-                node_order->f[d * node_order->n_slot + node[c * PAL_LANES + l]] += f[c - 1][d][l];
-                node_order->f[d * node_order->n_slot + node[l]] -= f[c - 1][d][l];
+                order->f[d * order->n_slot + node[c * PAL_LANES + l]] += f[c - 1][d][l];
+                order->f[d * order->n_slot + node[l]] -= f[c - 1][d][l];
             }
 }
 
-/* forces of all springs, strips first; returns the minimum that the kernel reports, at most 1 */
-PAL_INLINE double pal_spring_run(const pal_spring_set *set, pal_node_order *node_order, pal_spring_kernel kernel,
-                                 int n_corner)
+/* forces of the PAL_WIDE springs of a strip from `lane` on */
+PAL_INLINE void pal_spring_run_strip(const pal_spring_set *set, const pal_node_order *order, pal_spring_kernel kernel,
+                                     int n_corner, int lane, pal_wide *min)
 {
-    const int n_strip = set->simd_blocks.n_strip;
-    const double k = set->spring.k_J;
-    double *const fx = node_order->f, *const fy = fx + node_order->n_slot, *const fz = fy + node_order->n_slot;
-    const double *const x = node_order->x, *const y = x + node_order->n_slot, *const z = y + node_order->n_slot;
-    pal_wide f[PAL_CORNERS - 1][3], min = pal_wide_of(1);
+    const double *const x = order->x, *const y = x + order->n_slot, *const z = y + order->n_slot;
+    double *const fx = order->f, *const fy = fx + order->n_slot, *const fz = fy + order->n_slot;
+    const pal_wide w = pal_wide_load(set->w + lane);
     const double *p[PAL_CORNERS][3];
-    for (int i = 0; i < PAL_LANES / PAL_WIDE * n_strip; i++) {
-        const int b = i / (PAL_LANES / PAL_WIDE), lane = PAL_WIDE * i;
-        const pal_wide w = pal_wide_load(set->w + lane);
-        if (lane % PAL_LANES != 0 && !pal_wide_any(w != 0)) continue; /* the end of a block may be empty */
-        int32_t base[PAL_CORNERS];                                    /* a copy, which the stores below cannot change */
-        for (int c = 0; c < n_corner; c++) {
-            base[c] = set->simd_blocks.base[n_corner * b + c] + lane % PAL_LANES;
-            p[c][0] = x + base[c], p[c][1] = y + base[c], p[c][2] = z + base[c];
-        }
-        kernel(p, w, k * pal_wide_load(set->q + lane), f, &min);
-        pal_wide sum[3] = {f[0][0], f[0][1], f[0][2]};
-        for (int c = 2; c < n_corner; c++)
-            for (int d = 0; d < 3; d++) sum[d] += f[c - 1][d];
-        pal_wide_add(fx + base[0], -sum[0]), pal_wide_add(fy + base[0], -sum[1]), pal_wide_add(fz + base[0], -sum[2]);
-        for (int c = 1; c < n_corner; c++) {
-            pal_wide_add(fx + base[c], f[c - 1][0]);
-            pal_wide_add(fy + base[c], f[c - 1][1]);
-            pal_wide_add(fz + base[c], f[c - 1][2]);
-        }
+    pal_wide f[PAL_CORNERS - 1][3];
+    int32_t base[PAL_CORNERS];
+    if (lane % PAL_LANES != 0 && !pal_wide_any(w != 0)) return; /* the end of a block may be empty */
+    for (int c = 0; c < n_corner; c++) {
+        base[c] = set->simd_blocks.base[n_corner * (lane / PAL_LANES) + c] + lane % PAL_LANES;
+        p[c][0] = x + base[c], p[c][1] = y + base[c], p[c][2] = z + base[c];
     }
-    for (int lane = PAL_LANES * n_strip; lane < set->simd_blocks.n_lane; lane += PAL_WIDE) {
-        const int32_t *node = pal_block_nodes(&set->simd_blocks, lane / PAL_LANES) + lane % PAL_LANES;
-        double at[PAL_CORNERS][3][PAL_WIDE];
-        for (int c = 0; c < n_corner; c++)
-            for (int d = 0; d < 3; d++) {
-                for (int l = 0; l < PAL_WIDE; l++)
-                    at[c][d][l] = node_order->x[d * node_order->n_slot + node[c * PAL_LANES + l]];
-                p[c][d] = at[c][d];
-            }
-        kernel(p, pal_wide_load(set->w + lane), k * pal_wide_load(set->q + lane), f, &min);
-        pal_spring_add_loose(node_order, node, n_corner, f);
+    kernel(p, w, set->spring.k_J * pal_wide_load(set->q + lane), f, min);
+    pal_wide sum[3] = {f[0][0], f[0][1], f[0][2]};
+    for (int c = 2; c < n_corner; c++)
+        for (int d = 0; d < 3; d++) sum[d] += f[c - 1][d];
+    pal_wide_add(fx + base[0], -sum[0]), pal_wide_add(fy + base[0], -sum[1]), pal_wide_add(fz + base[0], -sum[2]);
+    for (int c = 1; c < n_corner; c++) {
+        pal_wide_add(fx + base[c], f[c - 1][0]);
+        pal_wide_add(fy + base[c], f[c - 1][1]);
+        pal_wide_add(fz + base[c], f[c - 1][2]);
     }
+}
+
+/* the same of a loose block */
+PAL_INLINE void pal_spring_run_loose(const pal_spring_set *set, const pal_node_order *order, pal_spring_kernel kernel,
+                                     int n_corner, int lane, pal_wide *min)
+{
+    const int32_t *node = pal_block_nodes(&set->simd_blocks, lane / PAL_LANES) + lane % PAL_LANES;
+    double at[PAL_CORNERS][3][PAL_WIDE];
+    const double *p[PAL_CORNERS][3];
+    pal_wide f[PAL_CORNERS - 1][3];
+    for (int c = 0; c < n_corner; c++)
+        for (int d = 0; d < 3; d++) {
+            for (int l = 0; l < PAL_WIDE; l++) at[c][d][l] = order->x[d * order->n_slot + node[c * PAL_LANES + l]];
+            p[c][d] = at[c][d];
+        }
+    kernel(p, pal_wide_load(set->w + lane), set->spring.k_J * pal_wide_load(set->q + lane), f, min);
+    pal_spring_add_loose(order, node, n_corner, f);
+}
+
+/* Forces of all springs, strips first, or of n blocks in ascending order (block NULL: all). Returns the minimum that
+ * the kernel reports, at most 1 */
+PAL_INLINE double pal_spring_run(const pal_spring_set *set, const pal_node_order *node_order, const int32_t *block,
+                                 int n, pal_spring_kernel kernel, int n_corner)
+{
+    const pal_spring_set springs = *set; /* copies, which the stores below cannot change */
+    const pal_node_order order = *node_order;
+    const int n_strip = springs.simd_blocks.n_strip;
+    pal_wide min = pal_wide_of(1);
+    int i = 0;
+    for (; i < n && (block ? block[i] : i) < n_strip; i++)
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE)
+            pal_spring_run_strip(&springs, &order, kernel, n_corner, PAL_LANES * (block ? block[i] : i) + l, &min);
+    for (; i < n; i++)
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE)
+            pal_spring_run_loose(&springs, &order, kernel, n_corner, PAL_LANES * (block ? block[i] : i) + l, &min);
     for (int l = 1; l < PAL_WIDE; l++) min[0] = min[l] < min[0] ? min[l] : min[0];
     return min[0];
 }

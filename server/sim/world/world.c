@@ -460,13 +460,13 @@ pal_err pal_world_step(pal_world *world, double dt_s)
     pal_team_hold(w->team);
     begin_step(w, dt_s);
     run_substeps(w, dt_s);
-    pal_team_release(w->team);
     pal_tools_end_step(&w->tools, w->n_substep);
     w->tick++;
     w->time_s += dt_s;
     run_stage(w, PAL_STAGE_ADAPT, dt_s);
     run_stage(w, PAL_STAGE_GUARD, dt_s);
     run_stage(w, PAL_STAGE_OUTPUT, dt_s);
+    pal_team_release(w->team);
     w->step_ns = pal_clock_thread_ns() - began;
     w->end_ns = pal_clock_ns();
     return w->component_err ? w->component_err : count_frozen(w) > frozen ? PAL_ERR_FROZEN : PAL_ERR_OK;

@@ -31,7 +31,7 @@ static bool bind_surface(pal_surface surface, int resolution, bound *b)
     b->out = malloc(3 * (size_t)surface.n_vertex * sizeof *b->out);
     if (!b->x || !b->frames || !b->out) return false;
     memcpy(b->x, b->tets.x, n * sizeof *b->x);
-    pal_skin_frames(&b->skin, b->x, b->frames);
+    pal_skin_frames(&b->skin, b->x, NULL, b->frames);
     return true;
 }
 
@@ -47,8 +47,8 @@ static void unbind(bound *b)
 
 static void show(bound *b)
 {
-    pal_skin_frames(&b->skin, b->x, b->frames);
-    pal_skin_evaluate(&b->skin, b->x, b->frames, b->out);
+    pal_skin_frames(&b->skin, b->x, NULL, b->frames);
+    pal_skin_evaluate(&b->skin, b->frames, NULL, b->out);
 }
 
 /* largest distance between the shown vertices and want [n][3] */
@@ -73,6 +73,30 @@ static void rest_gives_the_rest_surface(void)
     REQUIRE(bind_surface(shape_torus(50, 20, 60, 30), 20, &b));
     show(&b);
     CHECK_LE(largest_error(&b, b.surface.x), 1e-6 * 200);
+    unbind(&b);
+}
+
+static void threads_do_not_change_a_bit(void)
+{
+    bound b;
+    REQUIRE(bind_surface(shape_ball(0.1, 80, 40, 0.2), 14, &b));
+    uint64_t state = 3;
+    for (int i = 0; i < 3 * b.tets.n_node; i++) b.x[i] += 0.003 * random_signed(&state);
+    const size_t n_byte = 3 * sizeof *b.out * (size_t)b.surface.n_vertex;
+    float *one = malloc(n_byte);
+    REQUIRE(one);
+    show(&b);
+    memcpy(one, b.out, n_byte);
+    for (int threads = 2; threads <= 3; threads++) {
+        pal_team *team;
+        REQUIRE(!pal_team_create(threads, &team));
+        memset(b.frames, 0, pal_skin_frames_bytes(&b.skin));
+        pal_skin_frames(&b.skin, b.x, team, b.frames);
+        pal_skin_evaluate(&b.skin, b.frames, team, b.out);
+        CHECK(memcmp(one, b.out, n_byte) == 0);
+        pal_team_destroy(team);
+    }
+    free(one);
     unbind(&b);
 }
 
@@ -143,8 +167,8 @@ static void a_vertex_on_a_node_gets_it_exactly(void)
     REQUIRE(frames);
     for (int k = 0; k < 5; k++) {
         for (int i = 0; i < 3 * b.tets.n_node; i++) b.x[i] = 0.2 * random_signed(&state);
-        pal_skin_frames(&on, b.x, frames);
-        pal_skin_evaluate(&on, b.x, frames, out);
+        pal_skin_frames(&on, b.x, NULL, frames);
+        pal_skin_evaluate(&on, frames, NULL, out);
         for (int f = 0; f < n; f++)
             for (int c = 0; c < 3; c++) CHECK(out[3 * f + c] == (float)b.x[3 * node[f] + c]);
     }
@@ -316,6 +340,7 @@ static void a_mesh_without_a_surface_is_refused(void)
 int main(void)
 {
     RUN(rest_gives_the_rest_surface);
+    RUN(threads_do_not_change_a_bit);
     RUN(weights_follow_the_inverse_square_and_sum_to_one);
     RUN(rigid_motion_of_the_nodes_moves_the_surface_rigidly);
     RUN(a_vertex_on_a_node_gets_it_exactly);

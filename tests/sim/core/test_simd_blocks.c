@@ -1,6 +1,7 @@
 /* Blocks of voxels in rounds: every block is in one part, and no two parts of a round touch the same slot, also not
  * with lanes without an element, where kernels add zeros. Boxes, ellipsoids and every second voxel at random. */
 #include "server/sim/core/simd_blocks.h"
+#include "server/sim/core/tuning.h"
 #include "tests/check.h"
 #include "tests/fixtures/random.h"
 
@@ -145,8 +146,89 @@ static void few_blocks_are_outside_of_layers(void)
     }
 }
 
+/* ---- parts of a divided order ---- */
+
+/* adds at every slot of a block terms of which no two sums in different order are equal */
+static void add_terms(const voxels *v, const pal_node_order *order, int block)
+{
+    for (int c = 0; c < 8; c++)
+        for (int l = 0; l < PAL_LANES; l++) {
+            const int slot = slot_of(v, block, c, l);
+            for (int d = 0; d < 3; d++) {
+                const size_t at = (size_t)d * (size_t)order->n_slot + (size_t)slot;
+                order->f[at] += (order->x[at] + d) / (1.0 + 7 * block + c);
+            }
+        }
+}
+
+static void check_parts(voxels *v, int n_part, double *force)
+{
+    const int n_block = v->blocks.n_lane / PAL_LANES, n = v->n_node;
+    pal_part_blocks parts;
+    REQUIRE(!pal_node_order_divide(v->order, n_part, v->arena));
+    REQUIRE(!pal_part_blocks_make(&v->blocks, v->order, v->arena, &parts));
+    memset(force, 0, sizeof *force * 6 * (size_t)n);
+    pal_node_order_load(v->order, v->x);
+    for (int b = 0; b < n_block; b++) add_terms(v, v->order, b);
+    pal_node_order_add(v->order, force);
+    /* twice, so that what a part leaves in its arrays would show */
+    for (int turn = 0; turn < 2 && parts.first; turn++) {
+        memset(force + 3 * n, 0, sizeof *force * 3 * (size_t)n);
+        for (int p = 0; p < v->order->n_part; p++) {
+            pal_part_load(&parts, v->order, p, v->x);
+            for (int i = parts.first[p]; i < parts.first[p + 1]; i++) add_terms(v, &v->order->part[p], parts.block[i]);
+            pal_part_add(&parts, v->order, p, force + 3 * n);
+        }
+        CHECK(memcmp(force, force + 3 * n, sizeof *force * 3 * (size_t)n) == 0);
+    }
+    for (int p = 0; p < v->order->n_part && parts.first; p++)
+        CHECK_LE(parts.first[p + 1] - parts.first[p], PAL_PART_MAX * n_block);
+}
+
+/* whatever the number of parts, a node gets the sum of all blocks in their order, bit by bit */
+static void parts_sum_as_one_thread_does(void)
+{
+    static keep_cell *const keep[] = {keep_all, keep_ellipsoid, keep_half};
+    uint64_t seed = 5;
+    int n_divided = 0;
+    for (int k = 0; k < 120; k++) {
+        voxels v;
+        int size[3];
+        for (int c = 0; c < 3; c++) size[c] = 1 + (int)random_below(&seed, k % 6 == 0 ? 24 : 12);
+        make(&v, size, keep[k % 3]);
+        double *force = malloc(sizeof *force * 6 * (size_t)v.n_node + 1);
+        REQUIRE(force != NULL);
+        if (v.n_cell > 0) check_parts(&v, 2 + k % 4, force);
+        n_divided += v.n_cell > 0;
+        free(force);
+        drop(&v);
+    }
+    CHECK_LE(60, n_divided);
+}
+
+/* what two threads repeat of a body worth them: 2 of 25 layers and less */
+static void two_parts_repeat_few_blocks(void)
+{
+    static const int size[3] = {33, 25, 21};
+    static keep_cell *const keep[] = {keep_all, keep_ellipsoid, keep_half};
+    for (int k = 0; k < 3; k++) {
+        voxels v;
+        pal_part_blocks parts;
+        make(&v, size, keep[k]);
+        const int n_block = v.blocks.n_lane / PAL_LANES;
+        REQUIRE(!pal_node_order_divide(v.order, 2, v.arena));
+        REQUIRE(!pal_part_blocks_make(&v.blocks, v.order, v.arena, &parts));
+        REQUIRE(parts.first != NULL);
+        printf("  %d and %d of %d blocks\n", parts.first[1], parts.first[2] - parts.first[1], n_block);
+        CHECK_LE(parts.first[2], 1.25 * n_block);
+        drop(&v);
+    }
+}
+
 int main(void)
 {
+    RUN(parts_sum_as_one_thread_does);
+    RUN(two_parts_repeat_few_blocks);
     RUN(parts_of_a_round_share_no_slot);
     RUN(few_blocks_are_outside_of_layers);
     return check_report();
