@@ -33,6 +33,7 @@ typedef struct body {
     pal_cells cells;
     pal_prepared mesh;
     pal_scene *scene;
+    int threads; /* 0: one */
     pal_world *world;
 } body;
 
@@ -46,6 +47,7 @@ static pal_err start(const pal_cell_model *model, const char *operator, const ch
     b->scene->n_body = 1;
     b->scene->step_s = frame_s;
     b->scene->max_substep = 1000000;
+    b->scene->threads = b->threads;
     pal_body_def *def = &b->scene->body[0];
     pal_body_default_cells(def, "solid", &b->mesh, &b->cells);
     def->n_effect = 1;
@@ -89,7 +91,8 @@ typedef struct result {
     run step[2];     /* explicit, of operators polar and edges, with the default preconditioner, a factor of M~ */
     run diagonal;    /* with the paper's */
     run explicit_frame, implicit_frame;
-    double make_ms; /* world with implicit_euler, its factor */
+    run two_threads[2]; /* the same with two threads */
+    double make_ms;     /* world with implicit_euler, its factor */
 } result;
 
 static void add_case(pal_table *r, const pal_cell_model *m, const body *b, const result *c)
@@ -115,6 +118,9 @@ static void add_case(pal_table *r, const pal_cell_model *m, const body *b, const
               NUMBER("implicit_frame_ms", "implicit ms", 11, 3, c->implicit_frame.median_ms),
               NUMBER(NULL, "speed", 6, 1, 1e3 * frame_s / c->implicit_frame.median_ms),
               NUMBER("implicit_cg", "CG", 5, 1, c->implicit_frame.mean_cg),
+              NUMBER("explicit_two_threads", "x on 2", 6, 2, c->explicit_frame.median_ms / c->two_threads[0].median_ms),
+              NUMBER("implicit_two_threads", "implicit x on 2", 15, 2,
+                     c->implicit_frame.median_ms / c->two_threads[1].median_ms),
               NUMBER("implicit_make_ms", "make ms", 7, 0, c->make_ms));
     if (c->paper_ms / c->step[0].median_ms < min_ratio)
         pal_table_note(r, "%s: %.0f times the speed of the paper, wanted %.0f", m->name,
@@ -131,16 +137,20 @@ static pal_err measure(const pal_cell_model *model, pal_table *r, pal_diagnostic
         int n, n_warm;
         bool frames;
         run *out;
+        int threads;
     } job[] = {{"polar", "central_cg", NULL, N_STEP, N_STEP / 10, false, &c.step[0]},
                {"edges", "central_cg", NULL, N_STEP, N_STEP / 10, false, &c.step[1]},
                {"polar", "central_cg", "diagonal", N_STEP / 8, N_STEP / 80, false, &c.diagonal},
                {"polar", "central_cg", NULL, N_FRAME / 4, 2, true, &c.explicit_frame},
+               {"polar", "central_cg", NULL, N_FRAME / 4, 2, true, &c.two_threads[0], 2},
+               {"polar", "implicit_euler", NULL, N_FRAME, 2, true, &c.two_threads[1], 2},
                {"polar", "implicit_euler", NULL, N_FRAME, 2, true, &c.implicit_frame}};
     for (size_t k = 0; k < sizeof paper / sizeof paper[0]; k++)
         if (!strcmp(paper[k].name, model->name)) c.paper_ms = paper[k].ms;
     pal_err err = bench_solid(model, &b.cells, &b.mesh, diag);
     for (size_t k = 0; k < sizeof job / sizeof job[0] && !err; k++) {
         uint64_t began = pal_clock_thread_ns();
+        b.threads = job[k].threads;
         err = start(model, job[k].operator, job[k].solver, job[k].preconditioner, &b, diag);
         c.make_ms = 1e-6 * (double)(pal_clock_thread_ns() - began);
         if (!err) err = run_steps(&b, job[k].n, job[k].n_warm, job[k].frames, job[k].out, diag);

@@ -1,6 +1,8 @@
 /* Elements of subdivision solids in their own frames: forces, energy, and products with the tangent Q K Q'. */
 #include "server/sim/subdivision/cell_simd.h"
 
+#include "server/base/team.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -38,6 +40,79 @@ PAL_INLINE pal_wide give_swelling(const pal_cells_elastic *c, const int32_t *hom
 static void find_push(const pal_cells_elastic *c)
 {
     for (int i = 0; i < c->volume.n; i++) c->volume.push[i] = c->volume.share[i] * c->volume.sum[i];
+}
+
+/* ---- threads: what a half of a block leaves for the caller ---- */
+
+PAL_INLINE double *shared_force(const pal_cells_elastic *c, int kind, int n_node, int block, int lane)
+{
+    return c->shares.force[kind] + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane;
+}
+/* forces u on the nodes of a half: to out, or to where the caller finds them */
+PAL_INLINE void give_forces(const pal_cells_elastic *c, int kind, int n_node, int block, int lane, int n_live,
+                            pal_wide (*u)[PAL_CELL_MAX_NODES], double *out)
+{
+    const int32_t *node = c->group[kind].node + (size_t)block * (size_t)n_node * PAL_LANES + lane;
+    if (!c->shares.body) {
+        cell_scatter(node, n_node, n_live, u, out);
+        return;
+    }
+    double *to = shared_force(c, kind, n_node, block, lane);
+    for (int m = 0; m < n_node; m++)
+        for (int i = 0; i < 3; i++) pal_wide_store(to + (3 * m + i) * PAL_LANES, u[i][m]);
+}
+PAL_INLINE void give_swell(const pal_cells_elastic *c, int kind, int block, int lane, int n_live, pal_wide s)
+{
+    if (c->shares.body)
+        pal_wide_store(c->shares.swell[kind] + block * PAL_LANES + lane, s);
+    else
+        take_swelling(c, c->group[kind].home + block * PAL_LANES + lane, n_live, s);
+}
+/* what the halves have left, in their order: changes of volume (out NULL), or forces */
+PAL_INLINE void collect_blocks(const pal_cells_elastic *c, int kind, int n_node, double *out)
+{
+    const pal_cell_group *group = &c->group[kind];
+    for (int b = 0; b < group->n_block; b++)
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
+            const int n_live = cell_live(group, b, l);
+            const int32_t *node = group->node + (size_t)b * (size_t)n_node * PAL_LANES + l;
+            if (n_live == 0 || cell_recovering(c, group, b, l, n_live)) continue;
+            if (!out) {
+                const pal_wide s = pal_wide_load(c->shares.swell[kind] + b * PAL_LANES + l);
+                take_swelling(c, group->home + b * PAL_LANES + l, n_live, s);
+                continue;
+            }
+            const double *from = shared_force(c, kind, n_node, b, l);
+            for (int m = 0; m < n_node; m++)
+                for (int k = 0; k < n_live; k++)
+                    for (int i = 0; i < 3; i++)
+                        out[3 * (size_t)node[m * PAL_LANES + k] + (size_t)i] += from[(3 * m + i) * PAL_LANES + k];
+        }
+}
+static void collect(const pal_cells_elastic *c, double *out)
+{
+    collect_blocks(c, PAL_CELL_CUBIC, 64, out);
+    collect_blocks(c, PAL_CELL_HEX, 8, out);
+    collect_blocks(c, PAL_CELL_PYRAMID, 5, out);
+}
+
+/* a pass over all elements by several threads; blocks of each kind in a piece of work: some ten microseconds */
+typedef struct shared_pass {
+    pal_cells_elastic *c;
+    const double *d; /* positions, or the motion p */
+    int what;        /* 0: a product with the tangent */
+    bool swells;     /* of the product               */
+    double k;
+} shared_pass;
+static const int piece_blocks[PAL_CELL_KINDS] = {[PAL_CELL_CUBIC] = 1, [PAL_CELL_HEX] = 8, [PAL_CELL_PYRAMID] = 8};
+static void run_piece(void *user, int worker, int index);
+
+static void share(shared_pass *pass)
+{
+    int n = 0;
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
+        n += (pass->c->group[kind].n_block + piece_blocks[kind] - 1) / piece_blocks[kind];
+    pal_team_run(pass->c->shares.body->team, n, run_piece, pass);
 }
 
 /* g (world axes, forces with Q fixed) += the part from the change of Q */
@@ -89,7 +164,7 @@ PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_
     const int32_t *home = group->home + block * PAL_LANES + lane;
     const double *swell = swell_at(group, n_node, block, lane);
     if (what & SWELL) {
-        take_swelling(c, home, n_live, swelling(swell, n_node, u));
+        give_swell(c, (int)(group - c->group), block, lane, n_live, swelling(swell, n_node, u));
         return 0;
     }
     pal_wide push = apart ? give_swelling(c, home) : energy;
@@ -107,7 +182,7 @@ PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_
     for (int i = 0; i < 9; i++) minus[i] = -r[i];
     cell_rotate(minus, false, n_node, u, u);
     if (c->op == PAL_CELL_POLAR) add_rotation(group, block, lane, n_node, r, s, y, u);
-    cell_scatter(node, n_node, n_live, u, f);
+    give_forces(c, (int)(group - c->group), n_node, block, lane, n_live, u, f);
     return sum;
 }
 
@@ -120,8 +195,25 @@ PAL_INLINE double all_blocks(pal_cells_elastic *c, pal_cell_kind kind, int n_nod
     return sum;
 }
 
+/* energy of a kind, of the halves in their order */
+static double sum_shares(const pal_cells_elastic *c, int kind)
+{
+    double sum = 0;
+    for (int b = 0; b < c->group[kind].n_block; b++)
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) sum += c->shares.energy[kind][2 * b + l / PAL_WIDE];
+    return sum;
+}
+
+static double share_kinds(pal_cells_elastic *c, int what, const double *d, double *f)
+{
+    share(&(shared_pass){.c = c, .d = d, .what = what});
+    if (what & (FORCE | SWELL)) collect(c, what & SWELL ? NULL : f);
+    return sum_shares(c, PAL_CELL_CUBIC) + sum_shares(c, PAL_CELL_HEX) + sum_shares(c, PAL_CELL_PYRAMID);
+}
+
 PAL_INLINE double all_kinds(pal_cells_elastic *c, int what, const double *d, double *f)
 {
+    if (c->shares.body) return share_kinds(c, what, d, f);
     double sum = all_blocks(c, PAL_CELL_CUBIC, 64, what, d, f);
     sum += all_blocks(c, PAL_CELL_HEX, 8, what, d, f);
     return sum + all_blocks(c, PAL_CELL_PYRAMID, 5, what, d, f);
@@ -154,39 +246,89 @@ void pal_cells_elastic_linearise(pal_cells_elastic *c, const double *d)
 }
 
 /* a motion p at the last linearisation: changes of volume of the control cells, or products with the tangent */
-PAL_INLINE void move_blocks(const pal_cells_elastic *c, pal_cell_kind kind, int n_node, bool swells, double k,
-                            const double *p, double *out)
+PAL_INLINE void move_half(const pal_cells_elastic *c, pal_cell_kind kind, int n_node, int b, int l, bool swells,
+                          double k, const double *p, double *out)
 {
     const pal_cell_group *group = &c->group[kind];
     const pal_wide zero = {0};
-    for (int b = 0; b < group->n_block; b++)
-        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
-            const int n_live = cell_live(group, b, l);
-            const int32_t *node = group->node + (size_t)b * (size_t)n_node * PAL_LANES + l,
-                          *home = group->home + b * PAL_LANES + l;
-            const double *swell = swell_at(group, n_node, b, l);
-            pal_wide u[3][PAL_CELL_MAX_NODES], r[9];
-            if (n_live == 0 || cell_recovering(c, group, b, l, n_live)) continue;
-            cell_gather(node, n_node, p, u);
-            pal_wide_load_n(group->rotation + (size_t)b * 9 * PAL_LANES + l, 9, r);
-            cell_rotate(r, true, n_node, u, u);
-            if (swells) {
-                take_swelling(c, home, n_live, swelling(swell, n_node, u));
-                continue;
-            }
-            cell_stiffness(&c->line, group, b, l, n_node, u, NULL);
-            if (c->volume.n > 0) add_swelling(swell, n_node, give_swelling(c, home), u);
-            const pal_wide by = c->n_off > 0 ? k * pal_wide_load(group->here + b * PAL_LANES + l) : k + zero;
-            for (int i = 0; i < 9; i++) r[i] *= by;
-            cell_rotate(r, false, n_node, u, u);
-            cell_scatter(node, n_node, n_live, u, out);
-        }
+    const int n_live = cell_live(group, b, l);
+    const double *swell = swell_at(group, n_node, b, l);
+    pal_wide u[3][PAL_CELL_MAX_NODES], r[9];
+    if (n_live == 0 || cell_recovering(c, group, b, l, n_live)) return;
+    cell_gather(group->node + (size_t)b * (size_t)n_node * PAL_LANES + l, n_node, p, u);
+    pal_wide_load_n(group->rotation + (size_t)b * 9 * PAL_LANES + l, 9, r);
+    cell_rotate(r, true, n_node, u, u);
+    if (swells) {
+        give_swell(c, (int)kind, b, l, n_live, swelling(swell, n_node, u));
+        return;
+    }
+    cell_stiffness(&c->line, group, b, l, n_node, u, NULL);
+    if (c->volume.n > 0) add_swelling(swell, n_node, give_swelling(c, group->home + b * PAL_LANES + l), u);
+    const pal_wide by = c->n_off > 0 ? k * pal_wide_load(group->here + b * PAL_LANES + l) : k + zero;
+    for (int i = 0; i < 9; i++) r[i] *= by;
+    cell_rotate(r, false, n_node, u, u);
+    give_forces(c, (int)kind, n_node, b, l, n_live, u, out);
+}
+PAL_INLINE void move_blocks(const pal_cells_elastic *c, pal_cell_kind kind, int n_node, bool swells, double k,
+                            const double *p, double *out)
+{
+    for (int b = 0; b < c->group[kind].n_block; b++)
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) move_half(c, kind, n_node, b, l, swells, k, p, out);
 }
 PAL_INLINE void move_kinds(const pal_cells_elastic *c, bool swells, double k, const double *p, double *out)
 {
+    if (c->shares.body) {
+        share(&(shared_pass){.c = (pal_cells_elastic *)c, .d = p, .swells = swells, .k = k});
+        collect(c, swells ? NULL : out);
+        return;
+    }
     move_blocks(c, PAL_CELL_CUBIC, 64, swells, k, p, out);
     move_blocks(c, PAL_CELL_HEX, 8, swells, k, p, out);
     move_blocks(c, PAL_CELL_PYRAMID, 5, swells, k, p, out);
+}
+
+PAL_INLINE void piece_of(const shared_pass *pass, pal_cell_kind kind, int n_node, int first, int end)
+{
+    pal_cells_elastic *c = pass->c;
+    for (int b = first; b < end; b++)
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
+            if (pass->what == 0)
+                move_half(c, kind, n_node, b, l, pass->swells, pass->k, pass->d, NULL);
+            else
+                c->shares.energy[kind][2 * b + l / PAL_WIDE] =
+                    half_block(c, &c->group[kind], n_node, pass->what, b, l, pass->d, NULL);
+        }
+}
+static void run_piece(void *user, int worker, int index)
+{
+    const shared_pass *pass = user;
+    (void)worker;
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
+        const int n_block = pass->c->group[kind].n_block, per = piece_blocks[kind], n = (n_block + per - 1) / per;
+        if (index >= n) {
+            index -= n;
+            continue;
+        }
+        const int first = index * per, end = first + per < n_block ? first + per : n_block;
+        if (kind == PAL_CELL_CUBIC) piece_of(pass, PAL_CELL_CUBIC, 64, first, end);
+        if (kind == PAL_CELL_HEX) piece_of(pass, PAL_CELL_HEX, 8, first, end);
+        if (kind == PAL_CELL_PYRAMID) piece_of(pass, PAL_CELL_PYRAMID, 5, first, end);
+        return;
+    }
+}
+
+pal_err pal_cells_elastic_share(pal_cells_elastic *c, const pal_body *body, pal_arena *arena)
+{
+    pal_cell_shares *shares = &c->shares;
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
+        const size_t n = (size_t)c->group[kind].n_block, n_node = (size_t)c->group[kind].n_node;
+        shares->force[kind] = PAL_NEW(arena, double, n *n_node * 3 * PAL_LANES);
+        shares->swell[kind] = PAL_NEW(arena, double, n *PAL_LANES);
+        shares->energy[kind] = PAL_NEW(arena, double, 2 * n);
+        if (!shares->force[kind] || !shares->swell[kind] || !shares->energy[kind]) return PAL_ERR_MEMORY;
+    }
+    shares->body = body;
+    return PAL_ERR_OK;
 }
 
 void pal_cells_elastic_multiply(const pal_cells_elastic *c, double k, const double *p, double *out)

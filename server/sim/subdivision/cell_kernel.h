@@ -62,6 +62,15 @@ typedef struct pal_cell_volume {
     pal_cliques couple;
 } pal_cell_volume;
 
+/* What threads that share the elements leave for the caller, who sums up in the order of one thread; all NULL: the
+ * caller's thread works alone */
+typedef struct pal_cell_shares {
+    const pal_body *body;           /* whose team works                                             */
+    double *force[PAL_CELL_KINDS];  /* of each element at its nodes        [n_block][n_node][3][8] */
+    double *swell[PAL_CELL_KINDS];  /* part of its control cell's change of volume    [n_block][8] */
+    double *energy[PAL_CELL_KINDS]; /* of each half of a block, J                     [n_block][2] */
+} pal_cell_shares;
+
 typedef struct pal_cells_elastic {
     const pal_subdivision_solid *solid;
     pal_cell_operator op;
@@ -74,6 +83,7 @@ typedef struct pal_cells_elastic {
     pal_cell_volume volume;
     pal_cell_line line;
     pal_cell_group group[PAL_CELL_KINDS];
+    pal_cell_shares shares;
 } pal_cells_elastic;
 
 /* the part of lambda that an element keeps where its control cell has the rest */
@@ -92,6 +102,8 @@ static inline int pal_cell_pairs(int n_node)
 /* REFUSED: an element that is folded over in its middle, with its cell; MEMORY. Borrows the solid */
 pal_err pal_cells_elastic_make(const pal_subdivision_solid *solid, pal_cell_operator op, pal_arena *arena,
                                pal_cells_elastic *out, pal_diagnostic *diag);
+/* memory for the threads of a body's team, whatever its size will be; the same bits with any number. MEMORY */
+pal_err pal_cells_elastic_share(pal_cells_elastic *c, const pal_body *body, pal_arena *arena);
 /* computes the constants again when the solid's samples have changed; no heap */
 void pal_cells_elastic_refresh(pal_cells_elastic *c);
 void pal_cells_elastic_reset(pal_cells_elastic *c); /* rotations become the identity */
