@@ -33,7 +33,7 @@ typedef struct body {
     pal_cells cells;
     pal_prepared mesh;
     pal_scene *scene;
-    int threads; /* 0: one */
+    int threads;
     pal_world *world;
 } body;
 
@@ -138,13 +138,13 @@ static pal_err measure(const pal_cell_model *model, pal_table *r, pal_diagnostic
         bool frames;
         run *out;
         int threads;
-    } job[] = {{"polar", "central_cg", NULL, N_STEP, N_STEP / 10, false, &c.step[0]},
-               {"edges", "central_cg", NULL, N_STEP, N_STEP / 10, false, &c.step[1]},
-               {"polar", "central_cg", "diagonal", N_STEP / 8, N_STEP / 80, false, &c.diagonal},
-               {"polar", "central_cg", NULL, N_FRAME / 4, 2, true, &c.explicit_frame},
+    } job[] = {{"polar", "central_cg", NULL, N_STEP, N_STEP / 10, false, &c.step[0], 1},
+               {"edges", "central_cg", NULL, N_STEP, N_STEP / 10, false, &c.step[1], 1},
+               {"polar", "central_cg", "diagonal", N_STEP / 8, N_STEP / 80, false, &c.diagonal, 1},
+               {"polar", "central_cg", NULL, N_FRAME / 4, 2, true, &c.explicit_frame, 1},
                {"polar", "central_cg", NULL, N_FRAME / 4, 2, true, &c.two_threads[0], 2},
                {"polar", "implicit_euler", NULL, N_FRAME, 2, true, &c.two_threads[1], 2},
-               {"polar", "implicit_euler", NULL, N_FRAME, 2, true, &c.implicit_frame}};
+               {"polar", "implicit_euler", NULL, N_FRAME, 2, true, &c.implicit_frame, 1}};
     for (size_t k = 0; k < sizeof paper / sizeof paper[0]; k++)
         if (!strcmp(paper[k].name, model->name)) c.paper_ms = paper[k].ms;
     pal_err err = bench_solid(model, &b.cells, &b.mesh, diag);

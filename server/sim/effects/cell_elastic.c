@@ -9,6 +9,7 @@
  * use. Inverted elements recover (recovery/recovery.h). Because nodes are not dofs there is no bound
  * of stiffness (solvers find it by differences of forces), and the tangent is given by products only. */
 #include "server/sim/core/effect_list.h"
+#include "server/sim/core/tuning.h"
 #include "server/sim/elements/elastic_law.h"
 #include "server/sim/subdivision/cell_kernel.h"
 
@@ -25,7 +26,8 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     if (!cells) return PAL_ERR_MEMORY;
     *self = cells;
     PAL_TRY(pal_cells_elastic_make(solid, (pal_cell_operator)operator_kind, build->arena, cells, build->diag));
-    if (build->scene->threads > 1) PAL_TRY(pal_cells_elastic_share(cells, build->body, build->arena));
+    if (build->scene->threads > 1 && cells->n_cell >= PAL_SHARED_CELLS)
+        PAL_TRY(pal_cells_elastic_share(cells, build->body, build->arena));
     const bool cached = operator_kind == PAL_CELL_POLAR && build->body->implicit;
     return cached ? pal_force_cache_make(build->body->n_node, build->arena, &cells->force_cache) : PAL_ERR_OK;
 }
