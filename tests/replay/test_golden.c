@@ -7,7 +7,7 @@
 #include "tests/fixtures/boxes.h"
 #include "tests/fixtures/subdivision_scene.h"
 
-/* scenes run with one thread to this many */
+/* scenes that threads share run with one thread to this many */
 enum { THREADS = 3 };
 
 static pal_diagnostic diag;
@@ -47,13 +47,10 @@ static void pull_and_stiffen(pal_world *world, int tick)
 
 static void a_pulled_and_stiffened_block_has_its_golden_hash(void)
 {
-    for (int threads = 1; threads <= THREADS; threads++) {
-        pal_prepared box;
-        REQUIRE(!box_make(6, 4, 4, 0.01, &box));
-        pal_scene *scene = box_scene(&box, true, true);
-        scene->threads = threads;
-        CHECK(run(&box, scene, pull_and_stiffen, 120) == 0xe9e4502e912143ceu);
-    }
+    pal_prepared box;
+    REQUIRE(!box_make(6, 4, 4, 0.01, &box));
+    pal_scene *scene = box_scene(&box, true, true);
+    CHECK(run(&box, scene, pull_and_stiffen, 120) == 0xe9e4502e912143ceu);
 }
 
 /* a block with nodes enough for every thread sags */
@@ -67,7 +64,7 @@ static void a_large_block_has_the_same_hash_with_any_number_of_threads(void)
         CHECK_LE(THREADS * PAL_PART_NODES, box.tets.n_node);
         pal_scene *scene = box_scene(&box, true, true);
         scene->threads = threads;
-        const uint64_t hash = run(&box, scene, pull_and_stiffen, 5);
+        const uint64_t hash = run(&box, scene, pull_and_stiffen, 2);
         if (threads == 1) first = hash;
         CHECK(hash != 0 && hash == first);
     }
@@ -91,14 +88,12 @@ static void a_collapsed_and_a_tumbling_body_have_their_golden_hash(void)
 {
     /* springs alone open again by their weight, and without it by their recovery */
     static const uint64_t golden[] = {0x75cfd6c9bd424b85u, 0xcdb3f0a0d631e1dfu};
-    for (int k = 0; k < 2 * THREADS; k++) {
-        const int recover = k % 2;
+    for (int recover = 0; recover < 2; recover++) {
         pal_prepared box;
         REQUIRE(!box_make(4, 3, 3, 0.01, &box));
         pal_scene *scene = box_scene(&box, true, !recover);
         pal_entry_put_number(&scene->body[0].model, "c_area_Js", 1e-7, NULL);
         if (!recover) pal_entry_put_bool(&scene->body[0].model, "recover", false, NULL);
-        scene->threads = 1 + k / 2;
         scene->n_body = 2;
         pal_body_default(&scene->body[1], "other", &box);
         scene->body[1].output.name[0] = 0;
@@ -119,7 +114,7 @@ static void press_and_grasp(pal_world *world, int tick)
     pal_world_pose(world, 1, tick < 70 ? &pull : NULL);
 }
 
-static void press_and_grasp_block(int threads)
+static void a_pressed_and_grasped_block_has_its_golden_hash(void)
 {
     pal_prepared box;
     REQUIRE(!box_make(4, 3, 3, 0.01, &box));
@@ -130,18 +125,12 @@ static void press_and_grasp_block(int threads)
     pal_entry_init(&def->effect[def->n_effect++], "effects[3]", "tool_grasp");
     pal_tools_default(scene, 2);
     scene->tool[0].radius_m = scene->tool[1].radius_m = 0.006;
-    scene->threads = threads;
     CHECK(run(&box, scene, press_and_grasp, 100) == 0x0491b604d7845c08u);
-}
-
-static void a_pressed_and_grasped_block_has_its_golden_hash(void)
-{
-    for (int threads = 1; threads <= THREADS; threads++) press_and_grasp_block(threads);
 }
 
 /* our stomach, held at one end, on three levels: pressed at the front and grabbed beside it, both let go; levels come
  * and go */
-static void press_and_grasp_stomach(int threads)
+static void a_pressed_and_grasped_stomach_that_adapts_has_its_golden_hash(void)
 {
     pal_stomach stomach;
     REQUIRE(!pal_stomach_make(&stomach));
@@ -162,7 +151,6 @@ static void press_and_grasp_stomach(int threads)
     shell_scene_effect(&s, "tool_grasp");
     pal_tools_default(s.scene, 2);
     s.scene->tool[0].radius_m = s.scene->tool[1].radius_m = 0.015;
-    s.scene->threads = threads;
     REQUIRE(shell_scene_start(&s));
     const uint64_t start = pal_world_hash(s.world);
     for (int i = 0; i < 90; i++) {
@@ -183,12 +171,6 @@ static void press_and_grasp_stomach(int threads)
     shell_scene_close(&s);
 }
 
-static void a_pressed_and_grasped_stomach_that_adapts_has_its_golden_hash(void)
-{
-    press_and_grasp_stomach(1);
-    press_and_grasp_stomach(THREADS);
-}
-
 /* A block of control cells with cubic and trilinear elements, whose volumes are averaged, sags and recovers from a
  * corner that is pushed through it: no golden hash, as their solvers have factors, which differ from machine to machine
  */
@@ -203,7 +185,7 @@ static uint64_t run_cells(const char *solver, const char *operator, int threads)
     pal_entry_init(&s.def->effect[s.def->n_effect++], "effects[0]", "gravity");
     if (!solid_scene_open(&s)) return 0;
     const uint64_t start = pal_world_hash(s.world);
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 2; i++) {
         /* a corner is pushed through the block, so that its elements recover */
         if (i == 1)
             for (int c = 0; c < 3; c++) s.body->x[3 * (s.body->n_dof - 1) + c] -= 0.08;
@@ -230,9 +212,9 @@ static void control_cells_have_the_same_hash_with_any_number_of_threads(void)
 int main(void)
 {
     RUN(control_cells_have_the_same_hash_with_any_number_of_threads);
+    RUN(a_large_block_has_the_same_hash_with_any_number_of_threads);
     RUN(a_pressed_and_grasped_stomach_that_adapts_has_its_golden_hash);
     RUN(a_pulled_and_stiffened_block_has_its_golden_hash);
-    RUN(a_large_block_has_the_same_hash_with_any_number_of_threads);
     RUN(a_collapsed_and_a_tumbling_body_have_their_golden_hash);
     RUN(a_pressed_and_grasped_block_has_its_golden_hash);
     return check_report();
