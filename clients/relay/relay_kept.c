@@ -44,7 +44,8 @@ static void begin_run(pal_relay_kept *k)
     for (int p = 0; p < PAL_WIRE_PART_MAX; p++) {
         keep(k, &k->frame[p], NULL);
         pal_packet_replace(&k->coming[p], NULL);
-        k->epoch[p] = 0;
+        pal_relay_triangles_free(&k->triangles[p]);
+        k->epoch[p] = k->shown_seq[p] = 0;
     }
     keep(k, &k->tools, NULL);
     drop_orders(k);
@@ -59,6 +60,8 @@ static void show_frames(pal_relay_kept *k)
         if (!k->coming[p] || k->coming_epoch[p] != k->epoch[p]) continue;
         keep(k, &k->frame[p], k->coming[p]);
         k->coming[p] = NULL;
+        k->shown_seq[p] = k->coming_seq[p];
+        pal_relay_triangles_show(&k->triangles[p], k->epoch[p]);
     }
 }
 
@@ -131,8 +134,9 @@ static void read_names(pal_relay_names *n, const pal_wire_part_info *part, uint3
 static void show_epochs(pal_relay_kept *k, const pal_relay_names *n)
 {
     for (uint32_t p = 0; p < n->n_part; p++) {
-        if (n->epoch[p] != k->epoch[p]) keep(k, &k->frame[p], NULL);
+        if (n->epoch[p] != k->epoch[p]) keep(k, &k->frame[p], NULL), k->shown_seq[p] = 0;
         k->epoch[p] = n->epoch[p];
+        pal_relay_triangles_show_epoch(&k->triangles[p], n->epoch[p]);
     }
 }
 
@@ -166,11 +170,8 @@ static bool is_same_run(const pal_relay_kept *k, const pal_wire_hello *h)
 
 static void take_hello(pal_relay_kept *k, const pal_wire_hello *h, pal_packet *packet)
 {
-    if (!is_same_run(k, h)) begin_run(k);
     k->started = h->started;
     k->frame_rate_hz = h->frame_rate_hz;
-    k->adaptive = false;
-    for (uint32_t p = 0; p < h->n_part; p++) k->adaptive |= h->part[p].is_adaptive;
     snprintf(k->session, sizeof k->session, "%s", h->session);
     snprintf(k->title, sizeof k->title, "%s", h->title);
     k->up = true;
@@ -187,6 +188,26 @@ static void take_topology(pal_relay_kept *k, const pal_wire_topology *t, pal_pac
     forget_assets(k); /* of one that was never complete */
 }
 
+/* ---- triangles of parts that adapt: decoded before the lock is taken ---- */
+
+static void set_triangles(pal_relay_kept *k)
+{
+    for (int p = 0; p < PAL_WIRE_PART_MAX; p++) {
+        pal_relay_triangles *t = &k->triangles[p];
+        const pal_relay_asset *a = pal_relay_triangles_lack_asset(t) ? find(k, t->asset) : NULL;
+        if (a && pal_relay_triangles_set_asset(t, p, a->bytes->bytes, a->bytes->n_byte))
+            pal_log(PAL_LOG_WARN, "triangles", "part %d keeps those of its start: %s is not its asset", p, t->asset);
+    }
+}
+
+static void announce_triangles(pal_relay_kept *k, const pal_wire_part_info *part, uint32_t n_part, bool connection)
+{
+    for (uint32_t p = 0; p < n_part; p++)
+        if (pal_relay_triangles_announce(&k->triangles[p], &part[p], connection))
+            pal_log(PAL_LOG_WARN, "triangles", "part %u keeps those of its start: there are too many", p);
+    set_triangles(k);
+}
+
 /* ---- from upstream ---- */
 
 void pal_relay_take_text(pal_relay_kept *k, const pal_control *c, const char *text, size_t n_byte)
@@ -196,6 +217,13 @@ void pal_relay_take_text(pal_relay_kept *k, const pal_control *c, const char *te
                         c->type == PAL_CONTROL_ORDERS;
     pal_packet *packet = passed ? pal_packet_create(text, n_byte, true) : NULL;
     if (!packet) return;
+    if (c->type == PAL_CONTROL_HELLO && !is_same_run(k, &c->hello)) {
+        pthread_mutex_lock(&k->lock);
+        begin_run(k);
+        pthread_mutex_unlock(&k->lock);
+    }
+    if (c->type == PAL_CONTROL_HELLO) announce_triangles(k, c->hello.part, c->hello.n_part, true);
+    if (c->type == PAL_CONTROL_TOPOLOGY) announce_triangles(k, c->topology.part, c->topology.n_part, false);
     pthread_mutex_lock(&k->lock);
     if (c->type == PAL_CONTROL_HELLO)
         take_hello(k, &c->hello, packet);
@@ -216,8 +244,20 @@ static void take_frame(pal_relay_kept *k, const uint8_t *bytes, size_t n_byte)
     pal_frame_head head;
     if (pal_frame_get_head(bytes, n_byte, &head) || head.part >= PAL_WIRE_PART_MAX) return;
     if ((int32_t)(head.epoch - k->epoch[head.part]) < 0) return;
+    /* a new connection begins with the newest, which viewers may have */
+    const uint32_t shown = k->shown_seq[head.part];
+    if (head.epoch == k->epoch[head.part] && shown && (int32_t)(head.seq - shown) <= 0) return;
     pal_packet_replace(&k->coming[head.part], pal_packet_create(bytes, n_byte, false));
-    k->coming_epoch[head.part] = head.epoch;
+    k->coming_epoch[head.part] = head.epoch, k->coming_seq[head.part] = head.seq;
+}
+
+static void take_triangles(pal_relay_kept *k, uint16_t part, const uint8_t *bytes, size_t n_byte)
+{
+    const int refusal = part < PAL_WIRE_PART_MAX ? pal_relay_triangles_take(&k->triangles[part], bytes, n_byte) : 0;
+    if (refusal)
+        pal_log(PAL_LOG_WARN, "triangles", "part %u: a change is refused: %s", part, pal_refusal_text(refusal));
+    /* a FRAME from before this change, which waits for its asset, is not shown with it: the next one follows at once */
+    if (part < PAL_WIRE_PART_MAX) pal_packet_replace(&k->coming[part], NULL);
 }
 
 static void take_tools(pal_relay_kept *k, const uint8_t *bytes, size_t n_byte)
@@ -236,6 +276,7 @@ static void take_tools(pal_relay_kept *k, const uint8_t *bytes, size_t n_byte)
 void pal_relay_take_message(pal_relay_kept *k, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
 {
     if (head->kind == PAL_WIRE_FRAME) take_frame(k, bytes, n_byte);
+    if (head->kind == PAL_WIRE_TOPOLOGY_DELTA) take_triangles(k, head->index, bytes, n_byte);
     if (head->kind == PAL_WIRE_TOOLS) take_tools(k, bytes, n_byte);
 }
 
@@ -261,6 +302,9 @@ pal_err pal_relay_take_asset(pal_relay_kept *k, const char *path, const uint8_t 
     a->next = k->asset;
     k->asset = a;
     k->asset_bytes += n_byte;
+    pthread_mutex_unlock(&k->lock);
+    set_triangles(k);
+    pthread_mutex_lock(&k->lock);
     show(k);
     pthread_mutex_unlock(&k->lock);
     k->changed(k->changed_user);

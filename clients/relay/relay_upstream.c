@@ -111,6 +111,7 @@ static pal_err connect_up(pal_relay_upstream *u, pal_diagnostic *diag)
                                       .name = "relay",
                                       .role = PAL_WIRE_ROLE_VIEWER,
                                       .tool = PAL_WIRE_TOOL_NONE,
+                                      .topology_deltas = true,
                                       .events = &events,
                                       .user = u};
     u->heard_ns = pal_clock_ns();

@@ -27,9 +27,11 @@ typedef struct viewer {
     int n_answer;
     uint64_t text[PAL_RELAY_KINDS], frame[PAL_WIRE_PART_MAX], tools; /* numbers of what was sent last */
     uint64_t n_order;                                                /* sent of the orders */
-    pal_packet *out[PAL_WIRE_PART_MAX + 1];                          /* cycle in transmission: frames, then tools */
+    pal_packet *out[2 * PAL_WIRE_PART_MAX + 1]; /* cycle in transmission: changes of triangles and frames, then tools */
     int n_out, out_begin;
     uint32_t cycle; /* of it, and of the last one */
+    bool topology_deltas;
+    uint32_t change[PAL_WIRE_PART_MAX], change_epoch[PAL_WIRE_PART_MAX]; /* of the triangles that it has */
     uint64_t pose_error_ns;
 } viewer;
 
@@ -172,14 +174,10 @@ static void join(viewer *v, const pal_wire_join *wanted)
         return;
     }
     v->joined = true;
+    v->topology_deltas = wanted->topology_deltas;
     all->count.n_viewer++, all->count.n_joined++;
     v->peer->ops->ready(v->peer);
     if (wanted->role != PAL_WIRE_ROLE_VIEWER) refuse(v, "role", "this is a relay: here you may only watch");
-    pthread_mutex_lock(&all->kept->lock);
-    const bool adaptive = all->kept->adaptive;
-    pthread_mutex_unlock(&all->kept->lock);
-    if (adaptive && wanted->topology_deltas)
-        refuse(v, "topology", "a relay shows a part that adapts with the triangles of its start");
 }
 
 /* ---- what viewers say ---- */
@@ -278,12 +276,27 @@ static bool wants_cycle(const viewer *v)
     return v->of->kept->tools.number > v->tools && pal_credit_free(&v->credit);
 }
 
+/* what has changed of the triangles of a part since the last FRAME that it got; false: out of memory, so FRAME waits */
+static bool add_triangles(viewer *v, int p)
+{
+    pal_triangle_slots *slots = v->of->kept->triangles[p].slots;
+    if (!v->topology_deltas || !slots) return true;
+    if (v->change_epoch[p] != slots->epoch) v->change[p] = 0;
+    v->change_epoch[p] = slots->epoch;
+    if (v->change[p] == slots->change) return true;
+    pal_packet *delta = pal_triangle_slots_delta(slots, v->change[p]);
+    if (!delta) return false;
+    v->out[v->n_out++] = delta;
+    v->change[p] = slots->change;
+    return true;
+}
+
 static void begin_cycle(viewer *v)
 {
     const pal_relay_kept *k = v->of->kept;
     v->out_begin = v->n_out = 0;
     for (int p = 0; p < PAL_WIRE_PART_MAX; p++) {
-        if (k->frame[p].number <= v->frame[p]) continue;
+        if (k->frame[p].number <= v->frame[p] || !add_triangles(v, p)) continue;
         v->out[v->n_out++] = pal_packet_hold(k->frame[p].packet);
         v->frame[p] = k->frame[p].number;
         v->of->count.n_frame++;
