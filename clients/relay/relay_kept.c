@@ -3,6 +3,7 @@
 #include "clients/relay/tuning.h"
 #include "protocol/asset.h"
 #include "protocol/frame_codec.h"
+#include "protocol/interior_codec.h"
 #include "server/base/log.h"
 
 #include <stdio.h>
@@ -45,6 +46,7 @@ static void begin_run(pal_relay_kept *k)
         keep(k, &k->frame[p], NULL);
         pal_packet_replace(&k->coming[p], NULL);
         pal_relay_triangles_free(&k->triangles[p]);
+        pal_relay_values_ask(&k->values[p], (pal_relay_view){.fields = 0});
         k->epoch[p] = k->shown_seq[p] = 0;
     }
     keep(k, &k->tools, NULL);
@@ -120,7 +122,8 @@ static void read_names(pal_relay_names *n, const pal_wire_part_info *part, uint3
 {
     n->n_part = n_part, n->n_path = 0;
     for (uint32_t p = 0; p < n_part; p++) {
-        n->epoch[p] = part[p].epoch;
+        n->epoch[p] = part[p].epoch, n->fields[p] = 0;
+        for (uint32_t i = 0; i < part[p].n_field; i++) n->fields[p] |= 1u << pal_wire_field_find(part[p].field[i]);
         add_name(n, part[p].asset);
         add_name(n, part[p].interior);
         add_name(n, part[p].control_cells);
@@ -133,7 +136,10 @@ static void read_names(pal_relay_names *n, const pal_wire_part_info *part, uint3
 /* a frame of an older epoch is no key frame any more */
 static void show_epochs(pal_relay_kept *k, const pal_relay_names *n)
 {
+    k->n_part = n->n_part;
+    memcpy(k->fields, n->fields, sizeof k->fields);
     for (uint32_t p = 0; p < n->n_part; p++) {
+        pal_relay_values_show_epoch(&k->values[p], n->epoch[p], &k->number);
         if (n->epoch[p] != k->epoch[p]) keep(k, &k->frame[p], NULL), k->shown_seq[p] = 0;
         k->epoch[p] = n->epoch[p];
         pal_relay_triangles_show_epoch(&k->triangles[p], n->epoch[p]);
@@ -260,6 +266,21 @@ static void take_triangles(pal_relay_kept *k, uint16_t part, const uint8_t *byte
     if (part < PAL_WIRE_PART_MAX) pal_packet_replace(&k->coming[part], NULL);
 }
 
+static void take_values(pal_relay_kept *k, bool interior, const uint8_t *bytes, size_t n_byte)
+{
+    pal_field_head field = {.part = 0};
+    pal_interior_head inside = {.part = 0};
+    if (interior ? pal_interior_get_head(bytes, n_byte, &inside) : pal_field_get_head(bytes, n_byte, &field)) return;
+    const uint16_t part = interior ? inside.part : field.part;
+    pal_relay_value value = {.epoch = interior ? inside.epoch : field.epoch};
+    if (part >= PAL_WIRE_PART_MAX || !(value.packet = pal_packet_create(bytes, n_byte, false))) return;
+    pthread_mutex_lock(&k->lock);
+    value.number = ++k->number;
+    pal_relay_values_take(&k->values[part], interior, interior ? inside.field : field.field, value);
+    pthread_mutex_unlock(&k->lock);
+    k->changed(k->changed_user);
+}
+
 static void take_tools(pal_relay_kept *k, const uint8_t *bytes, size_t n_byte)
 {
     pal_wire_tools tools;
@@ -277,6 +298,8 @@ void pal_relay_take_message(pal_relay_kept *k, const pal_wire_head *head, const 
 {
     if (head->kind == PAL_WIRE_FRAME) take_frame(k, bytes, n_byte);
     if (head->kind == PAL_WIRE_TOPOLOGY_DELTA) take_triangles(k, head->index, bytes, n_byte);
+    if (head->kind == PAL_WIRE_FIELD || head->kind == PAL_WIRE_INTERIOR)
+        take_values(k, head->kind == PAL_WIRE_INTERIOR, bytes, n_byte);
     if (head->kind == PAL_WIRE_TOOLS) take_tools(k, bytes, n_byte);
 }
 
@@ -323,6 +346,33 @@ void pal_relay_lost(pal_relay_kept *k)
 {
     pthread_mutex_lock(&k->lock);
     k->up = false;
+    pthread_mutex_unlock(&k->lock);
+}
+
+static bool same_view(const pal_relay_view *a, const pal_relay_view *b)
+{
+    return a->fields == b->fields && a->interior == b->interior && a->energy == b->energy;
+}
+
+uint32_t pal_relay_next_request(pal_relay_kept *k, uint32_t first, pal_relay_view *wanted)
+{
+    uint32_t found = PAL_WIRE_PART_MAX;
+    pthread_mutex_lock(&k->lock);
+    for (uint32_t i = 0; i < k->n_part && found == PAL_WIRE_PART_MAX; i++) {
+        pal_relay_values *of = &k->values[(first + i) % k->n_part];
+        *wanted = pal_relay_values_wanted(of);
+        if (same_view(wanted, &of->asked)) continue;
+        pal_relay_values_ask(of, *wanted);
+        found = (first + i) % k->n_part;
+    }
+    pthread_mutex_unlock(&k->lock);
+    return found;
+}
+
+void pal_relay_forget_requests(pal_relay_kept *k)
+{
+    pthread_mutex_lock(&k->lock);
+    for (int p = 0; p < PAL_WIRE_PART_MAX; p++) pal_relay_values_ask(&k->values[p], (pal_relay_view){.fields = 0});
     pthread_mutex_unlock(&k->lock);
 }
 

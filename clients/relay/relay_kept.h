@@ -7,6 +7,7 @@
 #ifndef PAL_RELAY_KEPT_H
 #define PAL_RELAY_KEPT_H
 #include "clients/relay/relay_triangles.h"
+#include "clients/relay/relay_values.h"
 #include "protocol/control.h"
 #include "protocol/wire.h"
 #include "server/base/err.h"
@@ -33,6 +34,7 @@ typedef struct pal_relay_message {
 /* the epochs and assets of hello or topology */
 typedef struct pal_relay_names {
     uint32_t n_part, epoch[PAL_WIRE_PART_MAX];
+    uint32_t fields[PAL_WIRE_PART_MAX]; /* of each part, bits 1 << pal_wire_field */
     int n_path;
     char path[PAL_RELAY_PATHS][PAL_WIRE_NAME_BYTES];
 } pal_relay_names;
@@ -52,6 +54,8 @@ typedef struct pal_relay_kept {
     char session[PAL_WIRE_NAME_BYTES], title[PAL_WIRE_TEXT_BYTES];
     pal_relay_message text[PAL_RELAY_KINDS];
     pal_relay_message frame[PAL_WIRE_PART_MAX]; /* newest of closed cycles */
+    uint32_t n_part, fields[PAL_WIRE_PART_MAX]; /* parts as shown, and the fields of each */
+    pal_relay_values values[PAL_WIRE_PART_MAX];
     pal_relay_message tools;
     pal_relay_triangles triangles[PAL_WIRE_PART_MAX]; /* of these frames; it says what is [up] */
     uint32_t cycle;                                   /* of tools */
@@ -81,12 +85,17 @@ void pal_relay_kept_free(pal_relay_kept *kept); /* [load] */
 
 /* a text message of upstream, decoded and as it came; what viewers do not get is ignored. [up] */
 void pal_relay_take_text(pal_relay_kept *kept, const pal_control *decoded, const char *text, size_t n_byte);
-/* a binary message of upstream with a valid head; FRAME, TOPOLOGY_DELTA and TOOLS are kept. [up] */
+/* a binary message of upstream with a valid head; what viewers get of it is kept. [up] */
 void pal_relay_take_message(pal_relay_kept *kept, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte);
 /* REFUSED: its hash is not the name in its path, or nothing names it now; FULL: too much is kept; MEMORY. [up] */
 pal_err pal_relay_take_asset(pal_relay_kept *kept, const char *path, const uint8_t *bytes, size_t n_byte);
 void pal_relay_want_missing(pal_relay_kept *kept); /* asks once more for every asset that is missing. [up] */
 void pal_relay_lost(pal_relay_kept *kept);         /* upstream does not answer. [up] */
+
+/* part of which viewers want something else than upstream was asked for, from part `first` on in a circle, and what
+ * they want; from then on it counts as asked for. PAL_WIRE_PART_MAX: none. [up] */
+uint32_t pal_relay_next_request(pal_relay_kept *kept, uint32_t first, pal_relay_view *wanted);
+void pal_relay_forget_requests(pal_relay_kept *kept); /* upstream has been asked for nothing: a new connection. [up] */
 
 /* the caller's reference to an asset; NULL: unknown. [any] */
 pal_packet *pal_relay_find_asset(pal_relay_kept *kept, const char *path);

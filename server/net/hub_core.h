@@ -84,11 +84,11 @@ typedef struct pal_client {
     bool topology_deltas;               /* accepts TOPOLOGY_DELTA */
     bool moves;                         /* goes where a `move` sends it */
     uint32_t sent_change[PAL_BODY_MAX]; /* last triangle change sent, per part (pal_triangle_slots.change) */
-    uint8_t view[PAL_BODY_MAX];         /* subscribed pal_field, per part */
+    uint32_t view[PAL_BODY_MAX];        /* subscribed fields, per part: bits 1 << pal_field */
     bool interior[PAL_BODY_MAX];        /* with the values inside */
     bool energy[PAL_BODY_MAX];          /* subscribed to its energies in the status */
-    uint64_t sent_field[PAL_BODY_MAX], sent_interior[PAL_BODY_MAX]; /* numbers of the last values sent */
-    bool estimate[PAL_BODY_MAX], estimate_due[PAL_BODY_MAX];        /* subscribed; due */
+    uint64_t sent_values[PAL_BODY_MAX]; /* number of the last values sent (pal_stream_values.made) */
+    bool estimate[PAL_BODY_MAX], estimate_due[PAL_BODY_MAX]; /* subscribed; due */
     /* statistics */
     uint64_t n_byte, n_cycle, n_skipped;
     uint64_t status_byte, status_ns;                      /* at the last status */

@@ -266,8 +266,7 @@ static void send_topology(pal_hub_room *room)
         for (int p = 0; p < room->stream->n_part; p++) topology->part[p] = room->stream->part[p].info;
         pal_hub_put_plan(room, &topology->plan);
         memset(c->sent_change, 0, sizeof c->sent_change);
-        memset(c->sent_field, 0, sizeof c->sent_field);
-        memset(c->sent_interior, 0, sizeof c->sent_interior);
+        memset(c->sent_values, 0, sizeof c->sent_values);
         pal_hub_send(c);
     }
 }
