@@ -138,6 +138,7 @@ typedef struct pal_wire_hello {
     pal_wire_tool_info tool[PAL_WIRE_TOOL_MAX];
     pal_wire_plan plan;
     bool estimates;   /* `estimate` is available; false is not on the wire */
+    bool relay;       /* a relay: who is there watches, and every command is refused; false is not on the wire */
     uint32_t started; /* Unix time at which the server began, s: another one after a reconnection is another run. 0:
                          unknown, and not on the wire */
     uint32_t n_mark;  /* 0: not on the wire */

@@ -216,12 +216,26 @@ static void announce_triangles(pal_relay_kept *k, const pal_wire_part_info *part
 
 /* ---- from upstream ---- */
 
+/* hello as viewers get it: a relay takes no commands, so it offers none. NULL: it does not fit, or out of memory */
+static pal_packet *offer(const pal_control *hello)
+{
+    static pal_control offered; /* [up] only; too large for the stack, as is text */
+    static char text[PAL_CONTROL_OUT_MAX + 1];
+    size_t n = 0;
+    offered = *hello;
+    offered.hello.relay = true;
+    offered.hello.estimates = false;
+    return pal_control_put(text, sizeof text, &offered, &n) ? NULL : pal_packet_create(text, n, true);
+}
+
 void pal_relay_take_text(pal_relay_kept *k, const pal_control *c, const char *text, size_t n_byte)
 {
     const bool passed = c->type == PAL_CONTROL_HELLO || c->type == PAL_CONTROL_TOPOLOGY ||
                         c->type == PAL_CONTROL_MEMBERS || c->type == PAL_CONTROL_STATUS ||
                         c->type == PAL_CONTROL_ORDERS;
-    pal_packet *packet = passed ? pal_packet_create(text, n_byte, true) : NULL;
+    pal_packet *packet = c->type == PAL_CONTROL_HELLO ? offer(c)
+                         : passed                     ? pal_packet_create(text, n_byte, true)
+                                                      : NULL;
     if (!packet) return;
     if (c->type == PAL_CONTROL_HELLO && !is_same_run(k, &c->hello)) {
         pthread_mutex_lock(&k->lock);

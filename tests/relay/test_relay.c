@@ -158,6 +158,8 @@ static void viewers_see_what_the_server_sends(void)
     CHECK_INT(a.n_text[PAL_CONTROL_HELLO], 1);
     CHECK(a.n_text[PAL_CONTROL_STATUS] > 1 && a.n_text[PAL_CONTROL_MEMBERS] > 0);
     CHECK_TEXT(a.last[PAL_CONTROL_HELLO].hello.session, "small");
+    CHECK(direct.last[PAL_CONTROL_HELLO].hello.estimates && !direct.last[PAL_CONTROL_HELLO].hello.relay);
+    CHECK(!a.last[PAL_CONTROL_HELLO].hello.estimates && a.last[PAL_CONTROL_HELLO].hello.relay);
     CHECK_INT(a.last[PAL_CONTROL_HELLO].hello.you_role, PAL_WIRE_ROLE_VIEWER);
     CHECK_INT(a.tools.n_tool, direct.tools.n_tool);
     CHECK_INT(a.tools.tool[0].flags & PAL_WIRE_TOOL_HELD, PAL_WIRE_TOOL_HELD);
