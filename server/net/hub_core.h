@@ -169,6 +169,7 @@ typedef struct pal_hub_room {
     int n_viewer; /* who only watch: not among the members */
     bool members_changed;
     pal_packet *members_message;             /* encoded once for all; NULL: none yet */
+    pal_packet *status;                      /* of this tick, without the numbers of a client; NULL: none yet */
     uint64_t news_ns;                        /* when members or orders were told last */
     pal_hub_order order[PAL_WIRE_ORDER_MAX]; /* ring buffer */
     uint64_t n_order, reported_order;

@@ -260,6 +260,7 @@ static bool commit(pal_hub_room *room, pal_job *job)
 
 static void send_topology(pal_hub_room *room)
 {
+    pal_packet_replace(&room->status, NULL); /* of the session before */
     for (pal_client *c = NULL; (c = pal_hub_next_member(room, c));) {
         pal_wire_topology *topology = &pal_hub_message(room->hub, PAL_CONTROL_TOPOLOGY)->topology;
         topology->n_part = (uint32_t)room->stream->n_part;
