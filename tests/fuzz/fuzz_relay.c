@@ -66,7 +66,7 @@ static void make_upstream(void)
     pal_frame_order_destroy(order);
 }
 
-static void say(const pal_control *message)
+static void report(const pal_control *message)
 {
     static char text[PAL_CONTROL_OUT_MAX + 1];
     size_t n = 0;
@@ -102,7 +102,7 @@ static void announce(bool hello, uint8_t new_epoch, uint8_t flags)
     if (hello || new_epoch != epoch) memcpy(table, start, sizeof table);
     if (hello) revision = 0; /* upstream may be another relay, which counts anew */
     epoch = new_epoch;
-    say(&message);
+    report(&message);
 }
 
 static void pass(const uint8_t *bytes, size_t n)
