@@ -25,6 +25,7 @@
 #define PAL_WIRE_IMAGE_MAX     8 /* images on a part */
 #define PAL_WIRE_FIELDS_MAX    8 /* fields that a part may offer */
 #define PAL_WIRE_FIELD_BYTES   24
+#define PAL_WIRE_FIELDS_BYTES  96 /* of the names of all fields, with a space between two of them */
 #define PAL_WIRE_LOOK_BYTES    16
 #define PAL_WIRE_REASON_BYTES  128
 #define PAL_WIRE_LABEL_BYTES   120
@@ -54,7 +55,7 @@
     X(TAKE_TOOL, "take_tool", false)       /* take a tool                                                     */       \
     X(RELEASE_TOOL, "release_tool", false) /* release the own tool                                            */       \
     X(PING, "ping", false)                 /* round trip                                                      */       \
-    X(SUBSCRIBE_FIELD, "subscribe_field", false) /* subscribe to a field of a part, in place of the last one */
+    X(SUBSCRIBE_FIELD, "subscribe_field", false) /* subscribe to fields of a part, in place of the last ones */
 
 typedef enum pal_control_type {
 #define X(name, text, from_server) PAL_CONTROL_##name,
@@ -137,6 +138,7 @@ typedef struct pal_wire_hello {
     pal_wire_tool_info tool[PAL_WIRE_TOOL_MAX];
     pal_wire_plan plan;
     bool estimates;   /* `estimate` is available; false is not on the wire */
+    bool relay;       /* a relay: who is there watches, and every command is refused; false is not on the wire */
     uint32_t started; /* Unix time at which the server began, s: another one after a reconnection is another run. 0:
                          unknown, and not on the wire */
     uint32_t n_mark;  /* 0: not on the wire */
@@ -349,9 +351,9 @@ typedef struct pal_wire_estimate {
 
 typedef struct pal_wire_field_subscription {
     uint32_t part;
-    char field[PAL_WIRE_FIELD_BYTES]; /* as in the part's list, or "none" */
-    bool interior;                    /* INTERIOR messages too; where the part has none, there are none */
-    bool energy;                      /* energies of the part in `status`; where its model knows none, there are none */
+    char field[PAL_WIRE_FIELDS_BYTES]; /* as in the part's list, several with a space between, or "none" */
+    bool interior;                     /* INTERIOR messages too; where the part has none, there are none */
+    bool energy; /* energies of the part in `status`; where its model knows none, there are none */
 } pal_wire_field_subscription;
 
 typedef struct pal_control {

@@ -58,6 +58,7 @@ static const pal_control_field HELLO_fields[] = {
     {"component_reasons", TEXTS_OR_EMPTY, false, LIST(hello, plan.reason, plan.n_reason), NULL},
     {"component_required", NUMBERS, false, LIST(hello, plan.required, plan.n_required), NULL},
     {"estimates", BOOL, false, ONE(hello, estimates)},
+    {"relay", BOOL, false, ONE(hello, relay)},
     {"started", U32, false, ONE(hello, started)},
     {"marks", OBJECTS, false, LIST(hello, mark, n_mark), mark_fields},
     {"you", OBJECT, true, 0, 0, 0, 0, you_fields},

@@ -6,6 +6,7 @@
 #include <lz4.h>
 #include <math.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <string.h>
 
 #define STAMP_MAX ((uint64_t)1 << 53)
@@ -18,6 +19,34 @@ pal_wire_field pal_wire_field_find(const char *name)
     int i = 0;
     while (i < PAL_WIRE_FIELD_COUNT && strcmp(name_of[i], name)) i++;
     return (pal_wire_field)i;
+}
+
+bool pal_wire_field_get_set(const char *names, uint32_t *set)
+{
+    uint32_t found = 0;
+    for (const char *at = names;; at++) {
+        char name[PAL_WIRE_FIELD_BYTES];
+        const size_t n = strcspn(at, " ");
+        if (n >= sizeof name) return false;
+        memcpy(name, at, n);
+        name[n] = 0;
+        const pal_wire_field field = pal_wire_field_find(name);
+        if (field == PAL_WIRE_FIELD_COUNT) return false;
+        if (field != PAL_WIRE_FIELD_NONE) found |= 1u << field;
+        at += n;
+        if (!*at) break;
+    }
+    *set = found;
+    return true;
+}
+
+void pal_wire_field_put_set(uint32_t set, char names[PAL_WIRE_FIELDS_BYTES])
+{
+    size_t n = 0;
+    snprintf(names, PAL_WIRE_FIELDS_BYTES, "%s", name_of[PAL_WIRE_FIELD_NONE]);
+    for (int k = PAL_WIRE_FIELD_NONE + 1; k < PAL_WIRE_FIELD_COUNT; k++)
+        if (set & 1u << k)
+            n += (size_t)snprintf(names + n, PAL_WIRE_FIELDS_BYTES - n, "%s%s", n ? " " : "", name_of[k]);
 }
 
 size_t pal_field_bound(uint32_t n_vertex)

@@ -6,6 +6,7 @@
  * low) / 255 and float rounding. */
 #ifndef PAL_PROTOCOL_FIELD_CODEC_H
 #define PAL_PROTOCOL_FIELD_CODEC_H
+#include "protocol/control.h"
 #include "protocol/wire.h"
 
 #include <stddef.h>
@@ -30,6 +31,10 @@ typedef enum pal_wire_field {
 /* field of a name, as in `subscribe_field` and in parts: "none", "displacement", "von_mises", "energy", "stiffness",
  * "strain", "distortion", "young", "density", "damping"; COUNT: unknown */
 pal_wire_field pal_wire_field_find(const char *name);
+/* the fields that `subscribe_field` names, with one space between two of them, as bits 1 << field; "none" is 0. false:
+ * a name is unknown */
+bool pal_wire_field_get_set(const char *names, uint32_t *set);
+void pal_wire_field_put_set(uint32_t set, char names[PAL_WIRE_FIELDS_BYTES]); /* the inverse */
 
 typedef struct pal_field_head {
     uint16_t part;

@@ -3,6 +3,7 @@
 #include "clients/relay/tuning.h"
 #include "protocol/asset.h"
 #include "protocol/frame_codec.h"
+#include "protocol/interior_codec.h"
 #include "server/base/log.h"
 
 #include <stdio.h>
@@ -44,7 +45,9 @@ static void begin_run(pal_relay_kept *k)
     for (int p = 0; p < PAL_WIRE_PART_MAX; p++) {
         keep(k, &k->frame[p], NULL);
         pal_packet_replace(&k->coming[p], NULL);
-        k->epoch[p] = 0;
+        pal_relay_triangles_free(&k->triangles[p]);
+        pal_relay_values_ask(&k->values[p], (pal_relay_view){.fields = 0});
+        k->epoch[p] = k->shown_seq[p] = 0;
     }
     keep(k, &k->tools, NULL);
     drop_orders(k);
@@ -59,6 +62,8 @@ static void show_frames(pal_relay_kept *k)
         if (!k->coming[p] || k->coming_epoch[p] != k->epoch[p]) continue;
         keep(k, &k->frame[p], k->coming[p]);
         k->coming[p] = NULL;
+        k->shown_seq[p] = k->coming_seq[p];
+        pal_relay_triangles_show(&k->triangles[p], k->epoch[p]);
     }
 }
 
@@ -117,7 +122,8 @@ static void read_names(pal_relay_names *n, const pal_wire_part_info *part, uint3
 {
     n->n_part = n_part, n->n_path = 0;
     for (uint32_t p = 0; p < n_part; p++) {
-        n->epoch[p] = part[p].epoch;
+        n->epoch[p] = part[p].epoch, n->fields[p] = 0;
+        for (uint32_t i = 0; i < part[p].n_field; i++) n->fields[p] |= 1u << pal_wire_field_find(part[p].field[i]);
         add_name(n, part[p].asset);
         add_name(n, part[p].interior);
         add_name(n, part[p].control_cells);
@@ -130,9 +136,13 @@ static void read_names(pal_relay_names *n, const pal_wire_part_info *part, uint3
 /* a frame of an older epoch is no key frame any more */
 static void show_epochs(pal_relay_kept *k, const pal_relay_names *n)
 {
+    k->n_part = n->n_part;
+    memcpy(k->fields, n->fields, sizeof k->fields);
     for (uint32_t p = 0; p < n->n_part; p++) {
-        if (n->epoch[p] != k->epoch[p]) keep(k, &k->frame[p], NULL);
+        pal_relay_values_show_epoch(&k->values[p], n->epoch[p], &k->number);
+        if (n->epoch[p] != k->epoch[p]) keep(k, &k->frame[p], NULL), k->shown_seq[p] = 0;
         k->epoch[p] = n->epoch[p];
+        pal_relay_triangles_show_epoch(&k->triangles[p], n->epoch[p]);
     }
 }
 
@@ -166,11 +176,8 @@ static bool is_same_run(const pal_relay_kept *k, const pal_wire_hello *h)
 
 static void take_hello(pal_relay_kept *k, const pal_wire_hello *h, pal_packet *packet)
 {
-    if (!is_same_run(k, h)) begin_run(k);
     k->started = h->started;
     k->frame_rate_hz = h->frame_rate_hz;
-    k->adaptive = false;
-    for (uint32_t p = 0; p < h->n_part; p++) k->adaptive |= h->part[p].is_adaptive;
     snprintf(k->session, sizeof k->session, "%s", h->session);
     snprintf(k->title, sizeof k->title, "%s", h->title);
     k->up = true;
@@ -187,15 +194,56 @@ static void take_topology(pal_relay_kept *k, const pal_wire_topology *t, pal_pac
     forget_assets(k); /* of one that was never complete */
 }
 
+/* ---- triangles of parts that adapt: decoded before the lock is taken ---- */
+
+static void set_triangles(pal_relay_kept *k)
+{
+    for (int p = 0; p < PAL_WIRE_PART_MAX; p++) {
+        pal_relay_triangles *t = &k->triangles[p];
+        const pal_relay_asset *a = pal_relay_triangles_lack_asset(t) ? find(k, t->asset) : NULL;
+        if (a && pal_relay_triangles_set_asset(t, p, a->bytes->bytes, a->bytes->n_byte))
+            pal_log(PAL_LOG_WARN, "triangles", "part %d keeps those of its start: %s is not its asset", p, t->asset);
+    }
+}
+
+static void announce_triangles(pal_relay_kept *k, const pal_wire_part_info *part, uint32_t n_part, bool connection)
+{
+    for (uint32_t p = 0; p < n_part; p++)
+        if (pal_relay_triangles_announce(&k->triangles[p], &part[p], connection))
+            pal_log(PAL_LOG_WARN, "triangles", "part %u keeps those of its start: there are too many", p);
+    set_triangles(k);
+}
+
 /* ---- from upstream ---- */
+
+/* hello as viewers get it: a relay takes no commands, so it offers none. NULL: it does not fit, or out of memory */
+static pal_packet *offer(const pal_control *hello)
+{
+    static pal_control offered; /* [up] only; too large for the stack, as is text */
+    static char text[PAL_CONTROL_OUT_MAX + 1];
+    size_t n = 0;
+    offered = *hello;
+    offered.hello.relay = true;
+    offered.hello.estimates = false;
+    return pal_control_put(text, sizeof text, &offered, &n) ? NULL : pal_packet_create(text, n, true);
+}
 
 void pal_relay_take_text(pal_relay_kept *k, const pal_control *c, const char *text, size_t n_byte)
 {
     const bool passed = c->type == PAL_CONTROL_HELLO || c->type == PAL_CONTROL_TOPOLOGY ||
                         c->type == PAL_CONTROL_MEMBERS || c->type == PAL_CONTROL_STATUS ||
                         c->type == PAL_CONTROL_ORDERS;
-    pal_packet *packet = passed ? pal_packet_create(text, n_byte, true) : NULL;
+    pal_packet *packet = c->type == PAL_CONTROL_HELLO ? offer(c)
+                         : passed                     ? pal_packet_create(text, n_byte, true)
+                                                      : NULL;
     if (!packet) return;
+    if (c->type == PAL_CONTROL_HELLO && !is_same_run(k, &c->hello)) {
+        pthread_mutex_lock(&k->lock);
+        begin_run(k);
+        pthread_mutex_unlock(&k->lock);
+    }
+    if (c->type == PAL_CONTROL_HELLO) announce_triangles(k, c->hello.part, c->hello.n_part, true);
+    if (c->type == PAL_CONTROL_TOPOLOGY) announce_triangles(k, c->topology.part, c->topology.n_part, false);
     pthread_mutex_lock(&k->lock);
     if (c->type == PAL_CONTROL_HELLO)
         take_hello(k, &c->hello, packet);
@@ -216,8 +264,35 @@ static void take_frame(pal_relay_kept *k, const uint8_t *bytes, size_t n_byte)
     pal_frame_head head;
     if (pal_frame_get_head(bytes, n_byte, &head) || head.part >= PAL_WIRE_PART_MAX) return;
     if ((int32_t)(head.epoch - k->epoch[head.part]) < 0) return;
+    /* a new connection begins with the newest, which viewers may have */
+    const uint32_t shown = k->shown_seq[head.part];
+    if (head.epoch == k->epoch[head.part] && shown && (int32_t)(head.seq - shown) <= 0) return;
     pal_packet_replace(&k->coming[head.part], pal_packet_create(bytes, n_byte, false));
-    k->coming_epoch[head.part] = head.epoch;
+    k->coming_epoch[head.part] = head.epoch, k->coming_seq[head.part] = head.seq;
+}
+
+static void take_triangles(pal_relay_kept *k, uint16_t part, const uint8_t *bytes, size_t n_byte)
+{
+    const int refusal = part < PAL_WIRE_PART_MAX ? pal_relay_triangles_take(&k->triangles[part], bytes, n_byte) : 0;
+    if (refusal)
+        pal_log(PAL_LOG_WARN, "triangles", "part %u: a change is refused: %s", part, pal_refusal_text(refusal));
+    /* a FRAME from before this change, which waits for its asset, is not shown with it: the next one follows at once */
+    if (part < PAL_WIRE_PART_MAX) pal_packet_replace(&k->coming[part], NULL);
+}
+
+static void take_values(pal_relay_kept *k, bool interior, const uint8_t *bytes, size_t n_byte)
+{
+    pal_field_head field = {.part = 0};
+    pal_interior_head inside = {.part = 0};
+    if (interior ? pal_interior_get_head(bytes, n_byte, &inside) : pal_field_get_head(bytes, n_byte, &field)) return;
+    const uint16_t part = interior ? inside.part : field.part;
+    pal_relay_value value = {.epoch = interior ? inside.epoch : field.epoch};
+    if (part >= PAL_WIRE_PART_MAX || !(value.packet = pal_packet_create(bytes, n_byte, false))) return;
+    pthread_mutex_lock(&k->lock);
+    value.number = ++k->number;
+    pal_relay_values_take(&k->values[part], interior, interior ? inside.field : field.field, value);
+    pthread_mutex_unlock(&k->lock);
+    k->changed(k->changed_user);
 }
 
 static void take_tools(pal_relay_kept *k, const uint8_t *bytes, size_t n_byte)
@@ -236,6 +311,9 @@ static void take_tools(pal_relay_kept *k, const uint8_t *bytes, size_t n_byte)
 void pal_relay_take_message(pal_relay_kept *k, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
 {
     if (head->kind == PAL_WIRE_FRAME) take_frame(k, bytes, n_byte);
+    if (head->kind == PAL_WIRE_TOPOLOGY_DELTA) take_triangles(k, head->index, bytes, n_byte);
+    if (head->kind == PAL_WIRE_FIELD || head->kind == PAL_WIRE_INTERIOR)
+        take_values(k, head->kind == PAL_WIRE_INTERIOR, bytes, n_byte);
     if (head->kind == PAL_WIRE_TOOLS) take_tools(k, bytes, n_byte);
 }
 
@@ -261,6 +339,9 @@ pal_err pal_relay_take_asset(pal_relay_kept *k, const char *path, const uint8_t 
     a->next = k->asset;
     k->asset = a;
     k->asset_bytes += n_byte;
+    pthread_mutex_unlock(&k->lock);
+    set_triangles(k);
+    pthread_mutex_lock(&k->lock);
     show(k);
     pthread_mutex_unlock(&k->lock);
     k->changed(k->changed_user);
@@ -279,6 +360,33 @@ void pal_relay_lost(pal_relay_kept *k)
 {
     pthread_mutex_lock(&k->lock);
     k->up = false;
+    pthread_mutex_unlock(&k->lock);
+}
+
+static bool same_view(const pal_relay_view *a, const pal_relay_view *b)
+{
+    return a->fields == b->fields && a->interior == b->interior && a->energy == b->energy;
+}
+
+uint32_t pal_relay_next_request(pal_relay_kept *k, uint32_t first, pal_relay_view *wanted)
+{
+    uint32_t found = PAL_WIRE_PART_MAX;
+    pthread_mutex_lock(&k->lock);
+    for (uint32_t i = 0; i < k->n_part && found == PAL_WIRE_PART_MAX; i++) {
+        pal_relay_values *of = &k->values[(first + i) % k->n_part];
+        *wanted = pal_relay_values_wanted(of);
+        if (same_view(wanted, &of->asked)) continue;
+        pal_relay_values_ask(of, *wanted);
+        found = (first + i) % k->n_part;
+    }
+    pthread_mutex_unlock(&k->lock);
+    return found;
+}
+
+void pal_relay_forget_requests(pal_relay_kept *k)
+{
+    pthread_mutex_lock(&k->lock);
+    for (int p = 0; p < PAL_WIRE_PART_MAX; p++) pal_relay_values_ask(&k->values[p], (pal_relay_view){.fields = 0});
     pthread_mutex_unlock(&k->lock);
 }
 

@@ -23,6 +23,7 @@ struct pal_relay_upstream {
     uint64_t heard_ns; /* when it said something last */
     char url[512];
     fetch *fetches;
+    uint32_t next_part; /* whose fields are asked for next */
     int end_code;
     char end_reason[128];
 };
@@ -71,6 +72,7 @@ static void state(void *user, pal_link_state now, int code, const char *reason)
 {
     pal_relay_upstream *u = user;
     u->heard_ns = pal_clock_ns();
+    if (now == PAL_LINK_JOINED) pal_relay_forget_requests(u->kept);
     if (now == PAL_LINK_JOINED) pal_log(PAL_LOG_INFO, "upstream", "%s is relayed", u->kept->session);
     if (now != PAL_LINK_LOST && now != PAL_LINK_ENDED) return;
     pal_log(PAL_LOG_WARN, "upstream", "lost: %s", reason[0] ? reason : "no connection");
@@ -111,6 +113,7 @@ static pal_err connect_up(pal_relay_upstream *u, pal_diagnostic *diag)
                                       .name = "relay",
                                       .role = PAL_WIRE_ROLE_VIEWER,
                                       .tool = PAL_WIRE_TOOL_NONE,
+                                      .topology_deltas = true,
                                       .events = &events,
                                       .user = u};
     u->heard_ns = pal_clock_ns();
@@ -127,6 +130,23 @@ static void call_again(pal_relay_upstream *u)
     pal_relay_lost(u->kept);
     pal_link_close(u->link);
     if (connect_up(u, NULL)) end(u, PAL_WIRE_CLOSE_INTERNAL, pal_err_text(PAL_ERR_MEMORY));
+}
+
+/* asks for what viewers want to see: one part at a time */
+static void ask(void *user)
+{
+    pal_relay_upstream *u = user;
+    pal_relay_view wanted;
+    if (pal_link_current_state(u->link) != PAL_LINK_JOINED) return;
+    const uint32_t part = pal_relay_next_request(u->kept, u->next_part, &wanted);
+    if (part == PAL_WIRE_PART_MAX) return;
+    pal_control request = {.type = PAL_CONTROL_SUBSCRIBE_FIELD};
+    request.field_subscription.part = part;
+    request.field_subscription.interior = wanted.interior;
+    request.field_subscription.energy = wanted.energy;
+    pal_wire_field_put_set(wanted.fields, request.field_subscription.field);
+    if (pal_link_send_control(u->link, &request)) pal_log(PAL_LOG_WARN, "fields", "part %u is not asked for", part);
+    u->next_part = part + 1;
 }
 
 static void look_after(void *user)
@@ -146,6 +166,7 @@ pal_err pal_relay_upstream_open(pal_link_loop *loop, const char *url, pal_relay_
     pal_relay_kept_fetch_by(kept, want, u);
     pal_err err = connect_up(u, diag);
     if (!err && !pal_link_add_timer(loop, PAL_RELAY_LOOK_US, look_after, u)) err = PAL_ERR_MEMORY;
+    if (!err && !pal_link_add_timer(loop, PAL_RELAY_ASK_US, ask, u)) err = PAL_ERR_MEMORY;
     if (err) return pal_relay_upstream_close(u), err;
     *out = u;
     return PAL_ERR_OK;

@@ -27,9 +27,14 @@ typedef struct viewer {
     int n_answer;
     uint64_t text[PAL_RELAY_KINDS], frame[PAL_WIRE_PART_MAX], tools; /* numbers of what was sent last */
     uint64_t n_order;                                                /* sent of the orders */
-    pal_packet *out[PAL_WIRE_PART_MAX + 1];                          /* cycle in transmission: frames, then tools */
+    pal_packet *out[2 * PAL_WIRE_PART_MAX + 1]; /* cycle in transmission: changes of triangles and frames, then tools */
     int n_out, out_begin;
     uint32_t cycle; /* of it, and of the last one */
+    bool topology_deltas;
+    uint32_t change[PAL_WIRE_PART_MAX], change_epoch[PAL_WIRE_PART_MAX]; /* of the triangles that it has */
+    bool looks;                                                          /* at values of any part */
+    pal_relay_view view[PAL_WIRE_PART_MAX];
+    uint64_t values[PAL_WIRE_PART_MAX]; /* number of those that were sent last */
     uint64_t pose_error_ns;
 } viewer;
 
@@ -70,8 +75,21 @@ static void refuse(viewer *v, const char *code, const char *sentence)
 
 /* ---- coming and going ---- */
 
+/* what it wants to see of a part; the lock is held */
+static void set_view(viewer *v, uint32_t part, pal_relay_view now)
+{
+    pal_relay_values_change(&v->of->kept->values[part], &v->view[part], &now);
+    v->view[part] = now;
+    v->values[part] = 0;
+    v->looks = false;
+    for (int p = 0; p < PAL_WIRE_PART_MAX; p++) v->looks |= v->view[p].fields != 0;
+}
+
 static void leave(viewer *v)
 {
+    pthread_mutex_lock(&v->of->kept->lock);
+    for (uint32_t p = 0; p < PAL_WIRE_PART_MAX; p++) set_view(v, p, (pal_relay_view){.fields = 0});
+    pthread_mutex_unlock(&v->of->kept->lock);
     for (; v->n_answer > 0; v->n_answer--) pal_packet_drop(v->answer[v->n_answer - 1]);
     for (; v->out_begin < v->n_out; v->out_begin++) pal_packet_drop(v->out[v->out_begin]);
     if (v->joined) v->of->count.n_viewer--;
@@ -172,17 +190,32 @@ static void join(viewer *v, const pal_wire_join *wanted)
         return;
     }
     v->joined = true;
+    v->topology_deltas = wanted->topology_deltas;
     all->count.n_viewer++, all->count.n_joined++;
     v->peer->ops->ready(v->peer);
     if (wanted->role != PAL_WIRE_ROLE_VIEWER) refuse(v, "role", "this is a relay: here you may only watch");
-    pthread_mutex_lock(&all->kept->lock);
-    const bool adaptive = all->kept->adaptive;
-    pthread_mutex_unlock(&all->kept->lock);
-    if (adaptive && wanted->topology_deltas)
-        refuse(v, "topology", "a relay shows a part that adapts with the triangles of its start");
 }
 
 /* ---- what viewers say ---- */
+
+/* upstream is asked for it, if not for somebody else, by relay_upstream.c */
+static void subscribe(viewer *v, const pal_wire_field_subscription *wanted)
+{
+    pal_relay_kept *k = v->of->kept;
+    uint32_t fields = 0;
+    const bool known = pal_wire_field_get_set(wanted->field, &fields);
+    pthread_mutex_lock(&k->lock);
+    const bool no_part = wanted->part >= k->n_part;
+    const bool offered = !no_part && known && !(fields & ~k->fields[wanted->part]);
+    if (offered)
+        set_view(v, wanted->part,
+                 (pal_relay_view){.fields = fields, .interior = wanted->interior && fields, .energy = wanted->energy});
+    pthread_mutex_unlock(&k->lock);
+    if (offered)
+        v->peer->ops->ready(v->peer);
+    else
+        refuse(v, no_part ? "part" : "field", no_part ? "there is no such part" : "the part has no such field");
+}
 
 /* the result is why a message is malformed; 0: it is not */
 static int control(viewer *v, const uint8_t *bytes, size_t n_byte)
@@ -203,9 +236,7 @@ static int control(viewer *v, const uint8_t *bytes, size_t n_byte)
         answer(v, &pong);
         break;
     case PAL_CONTROL_SUBSCRIBE_FIELD:
-        if (in.field_subscription.interior || in.field_subscription.energy ||
-            strcmp(in.field_subscription.field, "none"))
-            refuse(v, "field", "a relay shows no fields, insides and energies: the server itself does");
+        subscribe(v, &in.field_subscription);
         break;
     case PAL_CONTROL_RELEASE_TOOL:
         break;
@@ -278,12 +309,27 @@ static bool wants_cycle(const viewer *v)
     return v->of->kept->tools.number > v->tools && pal_credit_free(&v->credit);
 }
 
+/* what has changed of the triangles of a part since the last FRAME that it got; false: out of memory, so FRAME waits */
+static bool add_triangles(viewer *v, int p)
+{
+    pal_triangle_slots *slots = v->of->kept->triangles[p].slots;
+    if (!v->topology_deltas || !slots) return true;
+    if (v->change_epoch[p] != slots->epoch) v->change[p] = 0;
+    v->change_epoch[p] = slots->epoch;
+    if (v->change[p] == slots->change) return true;
+    pal_packet *delta = pal_triangle_slots_delta(slots, v->change[p]);
+    if (!delta) return false;
+    v->out[v->n_out++] = delta;
+    v->change[p] = slots->change;
+    return true;
+}
+
 static void begin_cycle(viewer *v)
 {
     const pal_relay_kept *k = v->of->kept;
     v->out_begin = v->n_out = 0;
     for (int p = 0; p < PAL_WIRE_PART_MAX; p++) {
-        if (k->frame[p].number <= v->frame[p]) continue;
+        if (k->frame[p].number <= v->frame[p] || !add_triangles(v, p)) continue;
         v->out[v->n_out++] = pal_packet_hold(k->frame[p].packet);
         v->frame[p] = k->frame[p].number;
         v->of->count.n_frame++;
@@ -293,10 +339,25 @@ static void begin_cycle(viewer *v)
     v->tools = k->tools.number, v->cycle = k->cycle;
 }
 
+/* the values that it lacks next, while it has credit for a cycle, and of which part; NULL: none */
+static const pal_relay_value *lacking(const viewer *v, int *part)
+{
+    const pal_relay_kept *k = v->of->kept;
+    const pal_relay_value *found = NULL;
+    if (!v->looks || v->out_begin < v->n_out || !pal_credit_free(&v->credit)) return NULL;
+    for (*part = 0; *part < PAL_WIRE_PART_MAX; ++*part) {
+        found = pal_relay_values_lacking(&k->values[*part], &v->view[*part], k->epoch[*part], v->values[*part]);
+        if (found) break;
+    }
+    return found;
+}
+
 static bool has_news(const viewer *v)
 {
+    int part;
     return v->n_answer || v->out_begin < v->n_out ||
-           (v->joined && (next_text(v) < PAL_RELAY_KINDS || v->n_order < v->of->kept->n_order || wants_cycle(v)));
+           (v->joined && (next_text(v) < PAL_RELAY_KINDS || v->n_order < v->of->kept->n_order || wants_cycle(v) ||
+                          lacking(v, &part)));
 }
 
 static pal_packet *take_next(viewer *v)
@@ -317,6 +378,12 @@ static pal_packet *take_next(viewer *v)
     if (v->n_order < k->n_order) {
         if (k->n_order - v->n_order > PAL_RELAY_ORDERS) v->n_order = k->n_order - PAL_RELAY_ORDERS;
         return pal_packet_hold(k->order[v->n_order++ % PAL_RELAY_ORDERS]);
+    }
+    int part;
+    const pal_relay_value *values = lacking(v, &part);
+    if (values) {
+        v->values[part] = values->number;
+        return pal_packet_hold(values->packet);
     }
     if (v->out_begin == v->n_out && wants_cycle(v)) begin_cycle(v);
     if (v->out_begin == v->n_out) return NULL;

@@ -24,6 +24,9 @@
 #define PAL_RELAY_ASSETS_BYTES (1u << 30)
 /* us between two looks for assets that are missing and for a silent upstream (test_relay_server) */
 #define PAL_RELAY_LOOK_US 500000u
+/* us between two requests to upstream for other fields, so that viewers who change their minds all the time make half
+ * as many control messages as it takes of one client (test_relay_server) */
+#define PAL_RELAY_ASK_US 100000u
 /* ns without a message of upstream, which sends a status three times a second, after which it is called again
  * (test_relay_server) */
 #define PAL_RELAY_SILENT_NS 5000000000u

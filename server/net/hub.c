@@ -13,6 +13,7 @@
 #include "server/net/hub_peers.h"
 #include "server/net/hub_plan.h"
 #include "server/net/hub_sessions.h"
+#include "server/net/hub_status.h"
 #include "server/net/hub_steering.h"
 #include "server/net/hub_verb.h"
 #include "server/net/hub_watch.h"
@@ -41,56 +42,6 @@ static bool client_waiting(void *user, const pal_peer *peer)
     if (!c || peer->drop_code) return false;
     return c->n_queue || c->members_due || c->reported_order < c->room->reported_order || c->status_due || c->haptic ||
            c->out_begin < c->n_out || pal_hub_wants_estimate(c) || pal_hub_wants_field(c) || wants_cycle(c);
-}
-
-/* NULL: a replaced session has no frame yet, and its simulated time continues with the first */
-static pal_packet *status_message(pal_client *c)
-{
-    pal_hub *hub = c->hub;
-    const pal_stream *s = c->room->stream;
-    const pal_frame *f = s->frame;
-    if (!f && s->cycle) return NULL;
-    uint64_t now = pal_loop_now_ns(hub->loop);
-    pal_wire_status *w = &pal_hub_message(hub, PAL_CONTROL_STATUS)->status;
-    pal_diagnostic diag = {""};
-    w->n_member = (uint32_t)c->room->members.n_member;
-    w->n_viewer = (uint32_t)c->room->n_viewer;
-    w->rtt_ms = c->credit.rtt_s * 1e3;
-    w->n_skipped = (uint32_t)c->n_skipped;
-    if (c->status_ns && now > c->status_ns)
-        w->bytes_s = (double)(c->n_byte - c->status_byte) / ((double)(now - c->status_ns) * 1e-9);
-    c->status_ns = now;
-    c->status_byte = c->n_byte;
-    pal_session_last_diagnostic(c->room->session, &diag);
-    pal_plain_text(w->diag, sizeof w->diag, diag.text);
-    w->step_rate_hz = s->step_rate_hz;
-    w->step_ms = s->step_ms;
-    w->slowdown = 1;
-    if (f) {
-        w->tick = f->tick;
-        w->sim_time_s = f->time_s;
-        w->paused = f->paused;
-        if (isfinite(f->slowdown) && f->slowdown > 0) w->slowdown = f->slowdown;
-        w->substeps = f->n_substep > 0 ? (uint32_t)f->n_substep : 0;
-        w->n_component = (uint32_t)f->n_row;
-        for (int r = 0; r < f->n_row; r++) w->component_ms[r] = s->component_ms[r];
-        pal_hub_status_plan(c->room, f, w);
-        for (int p = 0; p < s->n_part; p++)
-            if (s->part[p].slots)
-                w->active[w->n_active++] =
-                    (pal_wire_active){(uint32_t)p, (uint32_t)f->part[p].n_active, (uint32_t)f->part[p].n_spring,
-                                      (uint32_t)f->part[p].n_finest, (uint32_t)f->part[p].n_finest_spring};
-        for (int p = 0; p < s->n_part; p++)
-            if (c->energy[p] && f->part[p].field[PAL_FIELD_ENERGY_J_M3].revision > 0)
-                w->energy[w->n_energy++] =
-                    (pal_wire_energy){(uint32_t)p, f->part[p].field[PAL_FIELD_ENERGY_J_M3].time_s, f->part[p].kinetic_J,
-                                      f->part[p].elastic_J};
-        pal_hub_playback_status(c->room, w);
-        w->n_device = (uint32_t)pal_stream_devices(s, c->room->tool, w->device);
-        w->n_late = f->n_late;
-        w->n_refused = f->n_refused;
-    }
-    return pal_hub_encode(hub);
 }
 
 /* queues the TOPOLOGY_DELTA for the newest frame of a part; false: not available now, so the frame waits too */
@@ -145,7 +96,7 @@ static pal_packet *take_next(pal_client *c)
     if ((p = pal_hub_next_orders(c))) return p;
     if (c->status_due) {
         c->status_due = false;
-        if ((p = status_message(c))) return p;
+        if ((p = pal_hub_next_status(c))) return p;
     }
     if ((p = pal_hub_next_estimate(c))) return p;
     if (c->haptic) {
@@ -348,6 +299,7 @@ static void hub_tick(void *user)
     pal_hub_hand_over_idle_tools(hub);
     for (int r = 0; r < hub->n_room; r++) {
         pal_stream_measure(hub->room[r]->stream, now);
+        pal_packet_replace(&hub->room[r]->status, NULL);
         pal_hub_update_subscriptions(hub->room[r]);
         pal_hub_count_unobserved(hub->room[r]);
         pal_hub_watch_pace(hub->room[r]);

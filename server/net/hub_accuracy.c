@@ -206,12 +206,12 @@ bool pal_hub_wants_estimate(const pal_client *c)
 
 pal_packet *pal_hub_next_estimate(pal_client *c)
 {
-    pal_wire_estimate *out = &pal_hub_message(c->hub, PAL_CONTROL_ESTIMATE)->estimate;
     pal_estimate estimate;
     pal_configuration now;
     char text[PAL_CONFIGURATION_TEXT];
     int b = due_body(c);
     if (b < 0) return NULL;
+    pal_wire_estimate *out = &pal_hub_message(c->hub, PAL_CONTROL_ESTIMATE)->estimate;
     c->estimate_due[b] = false;
     pal_plain_text(out->body, sizeof out->body, c->room->stream->part[b].info.name);
     pal_configuration_of(pal_session_scene(c->room->session), b, &now);

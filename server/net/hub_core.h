@@ -84,11 +84,11 @@ typedef struct pal_client {
     bool topology_deltas;               /* accepts TOPOLOGY_DELTA */
     bool moves;                         /* goes where a `move` sends it */
     uint32_t sent_change[PAL_BODY_MAX]; /* last triangle change sent, per part (pal_triangle_slots.change) */
-    uint8_t view[PAL_BODY_MAX];         /* subscribed pal_field, per part */
+    uint32_t view[PAL_BODY_MAX];        /* subscribed fields, per part: bits 1 << pal_field */
     bool interior[PAL_BODY_MAX];        /* with the values inside */
     bool energy[PAL_BODY_MAX];          /* subscribed to its energies in the status */
-    uint64_t sent_field[PAL_BODY_MAX], sent_interior[PAL_BODY_MAX]; /* numbers of the last values sent */
-    bool estimate[PAL_BODY_MAX], estimate_due[PAL_BODY_MAX];        /* subscribed; due */
+    uint64_t sent_values[PAL_BODY_MAX]; /* number of the last values sent (pal_stream_values.made) */
+    bool estimate[PAL_BODY_MAX], estimate_due[PAL_BODY_MAX]; /* subscribed; due */
     /* statistics */
     uint64_t n_byte, n_cycle, n_skipped;
     uint64_t status_byte, status_ns;                      /* at the last status */
@@ -169,6 +169,7 @@ typedef struct pal_hub_room {
     int n_viewer; /* who only watch: not among the members */
     bool members_changed;
     pal_packet *members_message;             /* encoded once for all; NULL: none yet */
+    pal_packet *status;                      /* of this tick, without the numbers of a client; NULL: none yet */
     uint64_t news_ns;                        /* when members or orders were told last */
     pal_hub_order order[PAL_WIRE_ORDER_MAX]; /* ring buffer */
     uint64_t n_order, reported_order;

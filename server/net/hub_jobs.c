@@ -260,14 +260,14 @@ static bool commit(pal_hub_room *room, pal_job *job)
 
 static void send_topology(pal_hub_room *room)
 {
+    pal_packet_replace(&room->status, NULL); /* of the session before */
     for (pal_client *c = NULL; (c = pal_hub_next_member(room, c));) {
         pal_wire_topology *topology = &pal_hub_message(room->hub, PAL_CONTROL_TOPOLOGY)->topology;
         topology->n_part = (uint32_t)room->stream->n_part;
         for (int p = 0; p < room->stream->n_part; p++) topology->part[p] = room->stream->part[p].info;
         pal_hub_put_plan(room, &topology->plan);
         memset(c->sent_change, 0, sizeof c->sent_change);
-        memset(c->sent_field, 0, sizeof c->sent_field);
-        memset(c->sent_interior, 0, sizeof c->sent_interior);
+        memset(c->sent_values, 0, sizeof c->sent_values);
         pal_hub_send(c);
     }
 }

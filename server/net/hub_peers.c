@@ -41,18 +41,17 @@ void pal_hub_update_subscriptions(pal_hub_room *room)
     }
 }
 
-void pal_hub_set_field(pal_client *c, int part, pal_field field, bool interior)
+void pal_hub_set_fields(pal_client *c, int part, uint32_t fields, bool interior)
 {
-    const pal_field before = (pal_field)c->view[part];
+    const uint32_t before = c->view[part];
     pal_stream_subscribers *of = &c->room->subscribers;
-    interior = interior && field != PAL_FIELD_NONE;
-    of->n_field[part][before] -= before != PAL_FIELD_NONE;
-    of->n_field[part][field] += field != PAL_FIELD_NONE;
-    of->n_interior[part][before] -= c->interior[part];
-    of->n_interior[part][field] += interior;
-    if (field != before) c->sent_field[part] = 0;
-    if (field != before || !interior) c->sent_interior[part] = 0;
-    c->view[part] = (uint8_t)field;
+    for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++) {
+        const bool was = before >> k & 1, is = fields >> k & 1;
+        of->n_field[part][k] += is - was;
+        of->n_interior[part][k] += (is && interior) - (was && c->interior[part]);
+    }
+    if (fields != before || interior != c->interior[part]) c->sent_values[part] = 0;
+    c->view[part] = fields;
     c->interior[part] = interior;
 }
 
@@ -73,7 +72,7 @@ void pal_hub_set_estimate(pal_client *c, int body, bool wanted)
 static void unsubscribe_all(pal_client *c)
 {
     for (int b = 0; b < c->room->stream->n_part; b++) {
-        pal_hub_set_field(c, b, PAL_FIELD_NONE, false);
+        pal_hub_set_fields(c, b, 0, false);
         pal_hub_set_energy(c, b, false);
         pal_hub_set_estimate(c, b, false);
     }

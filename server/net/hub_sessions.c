@@ -47,6 +47,7 @@ void pal_hub_room_close(pal_hub_room *room)
     pal_stream_close(room->stream);
     if (room->own) pal_session_close(room->session);
     pal_packet_drop(room->members_message);
+    pal_packet_drop(room->status);
     for (int k = 0; k < PAL_HUB_OLD_ASSETS; k++) pal_packet_drop(room->past[k].asset);
     pal_hub_free_edits(room->edits);
     if (room->keep) room->hub->source->close(room->hub->source->user, room->keep);

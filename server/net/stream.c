@@ -146,7 +146,8 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
         pal_plain_text(part->info.appearance, sizeof part->info.appearance, s->scene->body[index].appearance);
         pal_plain_text(part->info.colour, sizeof part->info.colour, s->scene->body[index].colour);
         if (!err && shown->is_adaptive)
-            err = pal_triangle_slots_make(index, part->info.epoch, shown, diag, &part->slots);
+            err = pal_triangle_slots_make(index, shown->name, part->info.epoch, shown->tri, part->info.n_triangle,
+                                          part->info.n_vertex, diag, &part->slots);
         for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++)
             if (pal_session_has_field(s->session, index, (pal_field)k))
                 pal_plain_text(part->info.field[part->info.n_field++], PAL_WIRE_FIELD_BYTES,

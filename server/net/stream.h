@@ -12,7 +12,7 @@
 #include "protocol/control.h"
 #include "protocol/frame_codec.h"
 #include "server/net/transport/packet.h"
-#include "server/net/triangle_slots.h"
+#include "server/net/transport/triangle_slots.h"
 #include "server/session/members.h"
 #include "server/session/session.h"
 

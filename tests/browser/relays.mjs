@@ -3,7 +3,19 @@
 import { spawn } from "node:child_process";
 import { createServer } from "node:net";
 import { join } from "node:path";
-import { check, checkConsoles, endWithTest, launch, open, pictures, prepare, program, run, serve } from "./common.mjs";
+import {
+    check,
+    checkConsoles,
+    endWithTest,
+    launch,
+    open,
+    pictures,
+    prepare,
+    program,
+    run,
+    serve,
+    until,
+} from "./common.mjs";
 
 const freePort = () =>
     new Promise((resolve) => {
@@ -43,6 +55,42 @@ await run(async () => {
     check("a trainee is at the server", tim.url().startsWith(place), tim.url().split("?")[0]);
     await eve.waitForFunction(() => [...window.palpate.state.members.values()].some(({ name }) => name === "Tim"));
     check("and the viewer at the relay sees that it is there", true);
+
+    // what a relay shows: fields, asked for upstream while somebody looks
+    const shown = (page, id) => page.evaluate((name) => document.getElementById(name).offsetWidth > 0, id);
+    await eve.selectOption("#field", "displacement");
+    await eve.waitForFunction(() => [...window.palpate.state.bodies.values()][0]?.colours.values);
+    const computes = (page) => page.evaluate(() => (window.palpate.state.status?.components ?? []).join());
+    check("a viewer at the relay sees the displacement in colours", true);
+    check(
+        "which the server computes for it",
+        await until(
+            () => computes(tim),
+            (list) => list.includes("field_output"),
+        ),
+    );
     await eve.screenshot({ path: join(pictures, "relay.png") });
+    await eve.selectOption("#field", "none");
+    const idle = await until(
+        () => computes(tim),
+        (list) => !list.includes("field_output"),
+    );
+    check("and no more when nobody looks", !idle.includes("field_output"), idle);
+    // what it refuses is not offered: estimates, and the reset of a body that stands
+    await tim.click("#panel-toggle");
+    await eve.click("#panel-toggle");
+    check("the server's page offers estimates", await shown(tim, "accuracy-toggle"));
+    check("the relay's does not", !(await shown(eve, "accuracy-toggle")));
+    const resets = (page) =>
+        page.evaluate(() => {
+            const { panel, state } = window.palpate;
+            const parts = [{ part: 0, frozen: true, asleep: false, reason: "It diverged.", safeguards: 0 }];
+            panel.showStatus({ ...state.status, parts }, state.figures, state.parts, !state.hello.relay);
+            return document.querySelectorAll("#bodies button").length;
+        });
+    check("the server's page offers to reset a body that stands", (await resets(tim)) === 1);
+    check("the relay's does not", (await resets(eve)) === 0);
+    const refused = await eve.evaluate(() => document.getElementById("notice").hidden);
+    check("nothing that the page of the relay has done was refused", refused);
     checkConsoles();
 });

@@ -25,6 +25,7 @@ typedef struct mem_client {
     pal_wire_haptic haptic;
     pal_field_head field;
     uint8_t *level; /* of the newest field [n_vertex] */
+    int n_of_field[PAL_WIRE_FIELD_COUNT], n_of_interior[PAL_WIRE_FIELD_COUNT];
     pal_asset *asset;
     pal_frame_decoder *decoder;
     float *position_m; /* [n_vertex][3] */
@@ -172,9 +173,11 @@ static inline void mem_take_binary(mem_client *c, const pal_packet *p)
         }
         c->n_field++;
         if (!c->level || pal_field_get(p->bytes, p->n_byte, c->asset->order->n_vertex, &c->field, c->level)) c->n_bad++;
+        c->n_of_field[c->field.field]++;
     } else if (head.kind == PAL_WIRE_INTERIOR) {
         c->n_interior++;
         if (pal_interior_get_head(p->bytes, p->n_byte, &c->interior)) c->n_bad++;
+        c->n_of_interior[c->interior.field]++;
     } else {
         c->n_haptic++;
         if (pal_wire_get_haptic(p->bytes, p->n_byte, &c->haptic)) c->n_bad++;

@@ -188,6 +188,35 @@ static void the_interior_goes_only_to_those_who_ask_for_it(void)
     end();
 }
 
+/* one connection may have several fields of a part, as a relay needs, each as often as alone */
+static void several_fields_of_a_part_come_at_once(void)
+{
+    mem_client ada;
+    begin(false);
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    UNTIL(ada.n_tools > 2, &ada, NULL);
+    mem_text(&ada, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement energy\",\"interior\":true}");
+    UNTIL(ada.n_field > 5, &ada, NULL);
+    mem_text(&ada, "{\"type\":\"command\",\"verb\":\"reset\"}");
+    for (int i = 0; i < 60; i++) turn(&ada, NULL);
+    const int displacement = ada.n_of_field[PAL_WIRE_FIELD_DISPLACEMENT_M],
+              energy = ada.n_of_field[PAL_WIRE_FIELD_ENERGY_J_M3];
+    for (int i = 0; i < 120; i++) turn(&ada, NULL); /* 2 s */
+    CHECK_INT(ada.n_of_field[PAL_WIRE_FIELD_DISPLACEMENT_M] - displacement, 20);
+    CHECK_INT(ada.n_of_field[PAL_WIRE_FIELD_ENERGY_J_M3] - energy, 20);
+    CHECK(ada.n_of_interior[PAL_WIRE_FIELD_DISPLACEMENT_M] > 3 && ada.n_of_interior[PAL_WIRE_FIELD_ENERGY_J_M3] > 3);
+    /* one of them goes on alone */
+    mem_text(&ada, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"energy\"}");
+    const int ended = ada.n_of_field[PAL_WIRE_FIELD_DISPLACEMENT_M], inside = ada.n_interior,
+              energy_before = ada.n_of_field[PAL_WIRE_FIELD_ENERGY_J_M3];
+    UNTIL(ada.n_of_field[PAL_WIRE_FIELD_ENERGY_J_M3] > energy_before + 5, &ada, NULL);
+    CHECK_INT(ada.n_of_field[PAL_WIRE_FIELD_DISPLACEMENT_M], ended);
+    CHECK_INT(ada.n_interior, inside);
+    CHECK_INT(ada.n_bad, 0);
+    mem_end(&ada);
+    end();
+}
+
 static void what_cannot_be_shown_is_answered_with_a_sentence(void)
 {
     static const struct {
@@ -222,6 +251,7 @@ int main(void)
     RUN(a_client_that_acknowledges_nothing_gets_no_more_fields);
     RUN(energies_go_into_the_status_of_those_who_ask);
     RUN(the_interior_goes_only_to_those_who_ask_for_it);
+    RUN(several_fields_of_a_part_come_at_once);
     RUN(what_cannot_be_shown_is_answered_with_a_sentence);
     pal_prepared_free(&organ.mesh);
     return check_report();

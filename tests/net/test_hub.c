@@ -230,6 +230,30 @@ static void slow_client_gets_coarser_frames_and_finer_ones_when_it_keeps_up(void
 }
 
 /* whatever tier a frame is of and however long its tissue has been at rest; mem_client counts those that do not grow */
+/* encoded once for all, but for the numbers of each */
+static void a_status_has_the_numbers_of_its_client(void)
+{
+    mem_client fast, slow;
+    begin(false, 0);
+    mem_join(&fast, transport, "fast", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&slow, transport, "slow", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    for (int i = 0; i < 200; i++) turn(&fast, i % 10 == 9 ? &slow : NULL);
+    slow.n_text[PAL_CONTROL_STATUS] = 0;
+    for (int i = 0; i < 30; i++) turn(&fast, &slow);
+    const pal_wire_status *of_fast = &fast.last[PAL_CONTROL_STATUS].status,
+                          *of_slow = &slow.last[PAL_CONTROL_STATUS].status;
+    REQUIRE(slow.n_text[PAL_CONTROL_STATUS] > 0);
+    CHECK_INT(of_fast->tick, of_slow->tick);
+    CHECK_INT(of_fast->n_viewer, 2);
+    CHECK_INT(of_slow->n_viewer, 2);
+    CHECK_INT(of_fast->n_skipped, 0);
+    CHECK_LE(100, of_slow->n_skipped); /* of 200 cycles it took one in ten */
+    CHECK(of_fast->bytes_s > 0 && of_slow->bytes_s > 0);
+    CHECK_INT(fast.n_bad + slow.n_bad, 0);
+    mem_end(&fast), mem_end(&slow);
+    end();
+}
+
 static void numbers_grow_through_every_change_of_tier(void)
 {
     mem_client c, all;
@@ -582,6 +606,7 @@ int main(void)
     RUN(stalled_client_costs_little_and_is_current_within_two_frames);
     RUN(without_acknowledgement_frames_stop_and_control_goes_on);
     RUN(slow_client_gets_coarser_frames_and_finer_ones_when_it_keeps_up);
+    RUN(a_status_has_the_numbers_of_its_client);
     RUN(numbers_grow_through_every_change_of_tier);
     RUN(a_tool_has_one_holder);
     RUN(an_unmoved_tool_goes_to_who_waits_for_one);

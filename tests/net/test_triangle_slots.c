@@ -1,6 +1,6 @@
 /* Tables of triangles that change: whatever a client has missed, one patch brings it to now. */
 #include "protocol/topology_delta_codec.h"
-#include "server/net/triangle_slots.h"
+#include "server/net/transport/triangle_slots.h"
 #include "tests/check.h"
 #include "tests/fixtures/random.h"
 
@@ -13,17 +13,10 @@ static uint32_t below(uint32_t n)
 }
 
 static int32_t table[PLACES][3];
-static float rest[VERTICES][3];
 
-static pal_shown shown_now(void)
+static pal_err make(uint32_t n_slot, pal_diagnostic *diag, pal_triangle_slots **out)
 {
-    return (pal_shown){.name = "ball",
-                       .n_vertex = VERTICES,
-                       .n_tri = PLACES,
-                       .rest_m = rest[0],
-                       .tri = table[0],
-                       .revision = 7,
-                       .is_adaptive = true};
+    return pal_triangle_slots_make(3, "ball", 1, table[0], n_slot, VERTICES, diag, out);
 }
 
 static void change_some(int n)
@@ -61,8 +54,7 @@ static void clients_that_come_and_skip_as_they_like_have_the_newest_table(void)
     pal_triangle_slots *p = NULL;
     size_t fixed = pal_packet_total();
     fill();
-    pal_shown shown = shown_now();
-    REQUIRE(pal_triangle_slots_make(3, 1, &shown, NULL, &p) == PAL_ERR_OK);
+    REQUIRE(make(PLACES, NULL, &p) == PAL_ERR_OK);
     for (int k = 0; k < CLIENTS; k++) memcpy(mine[k], table, sizeof table);
     for (int round = 0; round < CHECK_REPEATS(2000, 200); round++) {
         change_some((int)below(12));
@@ -83,8 +75,7 @@ static void hidden_are_the_vertices_of_no_triangle(void)
 {
     pal_triangle_slots *p = NULL;
     fill();
-    pal_shown shown = shown_now();
-    REQUIRE(pal_triangle_slots_make(3, 1, &shown, NULL, &p) == PAL_ERR_OK);
+    REQUIRE(make(PLACES, NULL, &p) == PAL_ERR_OK);
     for (int round = 0; round < CHECK_REPEATS(300, 50); round++) {
         bool used[VERTICES] = {false};
         int wrong = 0;
@@ -103,8 +94,7 @@ static void what_did_not_change_makes_no_delta(void)
 {
     pal_triangle_slots *p = NULL;
     fill();
-    pal_shown shown = shown_now();
-    REQUIRE(pal_triangle_slots_make(3, 1, &shown, NULL, &p) == PAL_ERR_OK);
+    REQUIRE(make(PLACES, NULL, &p) == PAL_ERR_OK);
     CHECK(!pal_triangle_slots_delta(p, 0));
     CHECK(!pal_triangle_slots_update(p, table[0], 9)); /* another revision, the same triangles */
     CHECK(!pal_triangle_slots_delta(p, 0));
@@ -121,8 +111,7 @@ static void clients_at_the_same_change_share_one_packet(void)
 {
     pal_triangle_slots *p = NULL;
     fill();
-    pal_shown shown = shown_now();
-    REQUIRE(pal_triangle_slots_make(3, 1, &shown, NULL, &p) == PAL_ERR_OK);
+    REQUIRE(make(PLACES, NULL, &p) == PAL_ERR_OK);
     for (uint64_t round = 0; round < 9; round++) {
         table[round][1] ^= 1;
         CHECK(pal_triangle_slots_update(p, table[0], 50 + round));
@@ -150,8 +139,7 @@ static void a_corner_that_is_no_vertex_empties_its_place(void)
 {
     pal_triangle_slots *p = NULL;
     fill();
-    pal_shown shown = shown_now();
-    REQUIRE(pal_triangle_slots_make(3, 1, &shown, NULL, &p) == PAL_ERR_OK);
+    REQUIRE(make(PLACES, NULL, &p) == PAL_ERR_OK);
     static const int32_t wrong[] = {VERTICES, -1, INT32_MAX, INT32_MIN};
     for (uint64_t k = 0; k < 4; k++) {
         table[5][0] = 3, table[5][1] = 4, table[5][2] = wrong[k];
@@ -160,9 +148,8 @@ static void a_corner_that_is_no_vertex_empties_its_place(void)
     }
     pal_triangle_slots_free(p);
     p = NULL;
-    shown.n_tri = PAL_TRIANGLE_SLOT_MAX + 1;
     pal_diagnostic diag = {""};
-    CHECK_INT(pal_triangle_slots_make(3, 1, &shown, &diag, &p), PAL_ERR_BUDGET);
+    CHECK_INT(make(PAL_TRIANGLE_SLOT_MAX + 1, &diag, &p), PAL_ERR_BUDGET);
     CHECK(!p && strstr(diag.text, "part ball: 4194305 triangles"));
 }
 

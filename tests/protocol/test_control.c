@@ -80,7 +80,9 @@ static void refuses_what_is_no_message(void)
         {"{\"type\":\"subscribe_field\",\"part\":0}", PAL_REFUSAL_FIELD},
         {"{\"type\":\"subscribe_field\",\"part\":-1,\"field\":\"none\"}", PAL_REFUSAL_RANGE},
         {"{\"type\":\"subscribe_field\",\"part\":0,\"field\":3}", PAL_REFUSAL_FIELD},
-        {"{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"a name that is longer than\"}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"a name that is longer than "
+         "all the names of fields one after the other, each with the space that stands between two of them\"}",
+         PAL_REFUSAL_FIELD},
         {"{\"type\":\"command\",\"verb\":\"x\",\"args\":[1]}", PAL_REFUSAL_FIELD},
         {"{\"type\":\"command\",\"verb\":\"x\",\"args\":{\"a\":\"b\"}}", PAL_REFUSAL_FIELD},
         {"{\"type\":\"command\",\"verb\":\"x\",\"args\":{\"a\":1,\"b\":1,\"c\":1,\"d\":1,\"e\":1,\"f\":1,\"g\":1,"

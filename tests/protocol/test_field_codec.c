@@ -148,6 +148,26 @@ static void names_and_numbers_agree(void)
     CHECK_INT(pal_wire_field_find(""), PAL_WIRE_FIELD_COUNT);
 }
 
+/* every set of fields has one list of names, which fits */
+static void sets_of_fields_are_named(void)
+{
+    static const char *const bad[] = {
+        "", " ", "rainbow", "energy ", " energy", "energy  strain", "energy,strain", "energyenergyenergyenergyenergy"};
+    char names[PAL_WIRE_FIELDS_BYTES];
+    uint32_t got = 7;
+    for (uint32_t set = 0; set < 1u << PAL_WIRE_FIELD_COUNT; set += 2) {
+        pal_wire_field_put_set(set, names);
+        CHECK(pal_wire_field_get_set(names, &got));
+        CHECK_INT(got, set);
+    }
+    CHECK_LE((double)strlen(names), PAL_WIRE_FIELDS_BYTES - 1);
+    pal_wire_field_put_set(0, names);
+    CHECK_TEXT(names, "none");
+    CHECK(pal_wire_field_get_set("strain energy", &got));
+    CHECK_INT(got, 1u << PAL_WIRE_FIELD_ENERGY_J_M3 | 1u << PAL_WIRE_FIELD_STRAIN);
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) CHECK(!pal_wire_field_get_set(bad[i], &got));
+}
+
 int main(void)
 {
     RUN(values_come_back_within_half_a_level);
@@ -156,5 +176,6 @@ int main(void)
     RUN(decoder_refuses_every_cut_and_every_longer_message);
     RUN(decoder_refuses_bad_kinds_ranges_and_blocks);
     RUN(names_and_numbers_agree);
+    RUN(sets_of_fields_are_named);
     return check_report();
 }

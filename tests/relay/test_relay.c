@@ -45,15 +45,35 @@ static void fetch(void *user, const char *path)
 
 static void connect_up(void)
 {
-    static const char join[] = "{\"type\":\"join\",\"name\":\"relay\",\"role\":\"viewer\",\"tool\":null}";
+    static const char join[] =
+        "{\"type\":\"join\",\"name\":\"relay\",\"role\":\"viewer\",\"tool\":null,\"topology_deltas\":true}";
     up = pal_mem_connect(transport, "");
+    pal_relay_forget_requests(&kept);
     pal_mem_send(up, join, strlen(join), true);
+}
+
+/* what viewers want to see, asked for as relay_upstream.c does */
+static void ask(void)
+{
+    pal_relay_view wanted;
+    char text[PAL_CONTROL_IN_MAX + 1];
+    size_t n = 0;
+    for (uint32_t part; (part = pal_relay_next_request(&kept, 0, &wanted)) < PAL_WIRE_PART_MAX;) {
+        pal_control request = {.type = PAL_CONTROL_SUBSCRIBE_FIELD};
+        request.field_subscription.part = part;
+        request.field_subscription.interior = wanted.interior;
+        request.field_subscription.energy = wanted.energy;
+        pal_wire_field_put_set(wanted.fields, request.field_subscription.field);
+        CHECK_INT(pal_control_put(text, sizeof text, &request, &n), 0);
+        pal_mem_send(up, text, n, true);
+    }
 }
 
 /* all that upstream has for the relay */
 static void pass(void)
 {
     static pal_control message;
+    ask();
     for (const pal_packet *p; (p = pal_mem_receive(up));) {
         pal_wire_head head;
         if (p->text) {
@@ -138,6 +158,8 @@ static void viewers_see_what_the_server_sends(void)
     CHECK_INT(a.n_text[PAL_CONTROL_HELLO], 1);
     CHECK(a.n_text[PAL_CONTROL_STATUS] > 1 && a.n_text[PAL_CONTROL_MEMBERS] > 0);
     CHECK_TEXT(a.last[PAL_CONTROL_HELLO].hello.session, "small");
+    CHECK(direct.last[PAL_CONTROL_HELLO].hello.estimates && !direct.last[PAL_CONTROL_HELLO].hello.relay);
+    CHECK(!a.last[PAL_CONTROL_HELLO].hello.estimates && a.last[PAL_CONTROL_HELLO].hello.relay);
     CHECK_INT(a.last[PAL_CONTROL_HELLO].hello.you_role, PAL_WIRE_ROLE_VIEWER);
     CHECK_INT(a.tools.n_tool, direct.tools.n_tool);
     CHECK_INT(a.tools.tool[0].flags & PAL_WIRE_TOOL_HELD, PAL_WIRE_TOOL_HELD);
@@ -242,9 +264,9 @@ static void nothing_that_a_viewer_says_goes_up(void)
         const char *text, *code;
     } message[] = {{"{\"type\":\"command\",\"verb\":\"pause\"}", "role"},
                    {"{\"type\":\"take_tool\",\"tool\":0}", "role"},
-                   {"{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}", "field"},
-                   {"{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"none\",\"interior\":true}", "field"},
-                   {"{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"none\",\"energy\":true}", "field"},
+                   {"{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"von_mises\"}", "field"},
+                   {"{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement rainbow\"}", "field"},
+                   {"{\"type\":\"subscribe_field\",\"part\":1,\"field\":\"none\"}", "part"},
                    {"{\"type\":\"join\",\"name\":\"again\",\"role\":\"viewer\",\"tool\":-1}", "joined"}};
     mem_client direct, v;
     const double at_m[3] = {0, 0, 0};
@@ -287,25 +309,117 @@ static void nothing_that_a_viewer_says_goes_up(void)
     end_relay();
 }
 
-/* a part that adapts comes with the triangles of its start, and whoever would take changes of them is told */
-static void changes_of_triangles_are_refused_in_words(void)
+static void same_triangles(const mem_client *a, const mem_client *b)
+{
+    same_shape(a, b);
+    CHECK_INT(memcmp(a->tri, b->tri, 3 * sizeof *a->tri * a->asset->n_triangle), 0);
+}
+
+/* Triangles change all the time. A viewer that keeps up has those of a client of the server with each cycle; one that
+ * skips cycles, one that comes later and one that takes no changes at all stand at the relay with it. The line up
+ * breaks and upstream begins at the asset again: those who stayed go on from what they have. */
+static void parts_that_adapt_are_shown_right(void)
 {
     static adaptive_scene storm;
-    mem_client changes, plain;
+    static mem_client direct, fast, slow, late, plain; /* too large for the stack */
     if (!adaptive_scene_make(&storm, ADAPTIVE_STORM)) CHECK_FAIL("no scene");
     begin_with(&storm.scene, false, (pal_relay_options){.max_viewers = 4});
-    mem_join_as(&changes, down, "Ada", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE, true);
-    mem_join(&plain, down, "Bo", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
-    for (int i = 0; i < 30; i++) turn(FRAME_NS, NULL, &changes, &plain);
-    CHECK_INT(changes.n_text[PAL_CONTROL_ERROR], 1);
-    CHECK_TEXT(changes.last[PAL_CONTROL_ERROR].error.code, "topology");
-    CHECK_INT(plain.n_text[PAL_CONTROL_ERROR], 0);
-    CHECK(changes.n_frame > 5 && plain.n_frame > 5);
-    CHECK_INT(changes.n_patch + changes.n_bad + plain.n_bad, 0);
-    same_shape(&changes, &plain);
-    mem_end(&changes), mem_end(&plain);
+    mem_join_as(&direct, transport, "Tim", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE, true);
+    mem_join_as(&fast, down, "fast", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE, true);
+    mem_join_as(&slow, down, "slow", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE, true);
+    mem_join(&plain, down, "plain", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    for (int i = 0; i < 60; i++) {
+        turn(FRAME_NS, &direct, &fast, i % 7 == 6 ? &slow : &plain);
+        if (direct.n_frame > 0) same_triangles(&fast, &direct);
+    }
+    CHECK(fast.n_patch > 15);
+    mem_join_as(&late, down, "late", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE, true);
+    mem_pull(&late, 1000), mem_pull(&slow, 1000), mem_pull(&plain, 1000);
+    same_triangles(&late, &direct), same_triangles(&slow, &direct);
+    CHECK_INT(late.n_patch, 1);
+    CHECK(slow.n_patch > 1 && slow.n_patch < fast.n_patch);
+    same_shape(&plain, &direct);
+    CHECK_INT(plain.n_patch, 0);
+    CHECK_INT(memcmp(plain.tri, plain.asset->triangle, 3 * sizeof *plain.tri * plain.asset->n_triangle), 0);
+
+    pal_mem_leave(up);
+    pal_relay_lost(&kept);
+    connect_up();
+    for (int i = 0; i < 30; i++) {
+        turn(FRAME_NS, &direct, &fast, &late);
+        if (i > 1) same_triangles(&fast, &direct), same_triangles(&late, &direct);
+    }
+    CHECK_INT(fast.n_text[PAL_CONTROL_HELLO], 1);
+    CHECK_INT(direct.n_bad + fast.n_bad + slow.n_bad + late.n_bad + plain.n_bad, 0);
+    CHECK_INT(fast.n_text[PAL_CONTROL_ERROR], 0);
+    mem_end(&fast), mem_end(&slow), mem_end(&late), mem_end(&plain), mem_end(&direct);
     end_relay();
     adaptive_scene_free(&storm);
+}
+
+static void same_values(const mem_client *a, const mem_client *b)
+{
+    CHECK(a->field.field == b->field.field && a->field.sim_time_us == b->field.sim_time_us);
+    CHECK(a->field.low == b->field.low && a->field.high == b->field.high);
+    CHECK_INT(memcmp(a->level, b->level, a->field.n_vertex), 0);
+}
+
+/* Each sees the field of its choice, to the bit as a client of the server does; upstream is asked for each kind once,
+ * and for none when nobody looks. */
+static void viewers_see_the_fields_that_they_ask_for(void)
+{
+    static mem_client direct, a, b, c; /* too large for the stack */
+    const double top_m[3] = {0, 0, 0.04};
+    begin(false, (pal_relay_options){.max_viewers = 4});
+    mem_join(&direct, transport, "Tim", PAL_WIRE_ROLE_TRAINEE, 0);
+    mem_join(&a, down, "Ada", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&b, down, "Bo", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&c, down, "Cy", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    for (int i = 0; i < 5; i++) turn(FRAME_NS, &direct, &a, &b);
+    mem_text(&direct, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}");
+    mem_text(&a, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}");
+    mem_text(&b, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"energy\",\"interior\":true,\"energy\":true}");
+    for (uint32_t i = 1; i <= 120; i++) {
+        mem_pose(&direct, 0, i, top_m);
+        turn(FRAME_NS, &direct, &a, &b);
+        mem_pull(&c, 1000);
+        if (a.n_field > 0 && a.field.sim_time_us == direct.field.sim_time_us) same_values(&a, &direct);
+    }
+    CHECK(a.n_field > 10 && b.n_field > 10 && b.n_interior > 3 && direct.field.high > 0);
+    CHECK_LE(abs(a.n_field - direct.n_field), 2);
+    CHECK_INT(a.n_of_field[PAL_WIRE_FIELD_DISPLACEMENT_M], a.n_field);
+    CHECK_INT(b.n_of_field[PAL_WIRE_FIELD_ENERGY_J_M3], b.n_field);
+    CHECK_INT(b.n_of_interior[PAL_WIRE_FIELD_ENERGY_J_M3], b.n_interior);
+    CHECK_INT(a.n_interior + c.n_field + c.n_interior, 0);
+    CHECK_INT(b.last[PAL_CONTROL_STATUS].status.n_energy, 1);
+    CHECK_INT(kept.values[0].asked.fields, 1u << PAL_WIRE_FIELD_DISPLACEMENT_M | 1u << PAL_WIRE_FIELD_ENERGY_J_M3);
+
+    /* what is kept is shown at once to who asks for the same */
+    mem_text(&c, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement energy\"}");
+    mem_pull(&c, 1000);
+    CHECK_INT(c.n_of_field[PAL_WIRE_FIELD_DISPLACEMENT_M], 1);
+    CHECK_INT(c.n_of_field[PAL_WIRE_FIELD_ENERGY_J_M3], 1);
+
+    /* the line breaks: upstream is asked again */
+    pal_mem_leave(up);
+    pal_relay_lost(&kept);
+    connect_up();
+    const int n_before = a.n_field;
+    for (int i = 0; i < 30; i++) turn(FRAME_NS, &direct, &a, &b);
+    CHECK(a.n_field > n_before + 1);
+
+    /* nobody looks any more, in words or by leaving: nothing is kept, and upstream computes what its own clients see */
+    mem_text(&a, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"none\"}");
+    mem_end(&b), mem_end(&c);
+    mem_text(&direct, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"none\"}");
+    for (int i = 0; i < 60; i++) turn(FRAME_NS, &direct, &a, NULL);
+    CHECK_INT(kept.values[0].asked.fields + kept.values[0].asked.interior + kept.values[0].asked.energy, 0);
+    CHECK(!kept.values[0].field[PAL_WIRE_FIELD_DISPLACEMENT_M].packet);
+    CHECK(!kept.values[0].interior[PAL_WIRE_FIELD_ENERGY_J_M3].packet);
+    CHECK_INT(direct.last[PAL_CONTROL_STATUS].status.n_component_name, 0); /* no field_output in the plan */
+    CHECK_INT(a.n_bad + direct.n_bad, 0);
+    mem_end(&a), mem_end(&direct);
+    end_relay();
 }
 
 static pal_ticket_key ticket_key;
@@ -527,7 +641,8 @@ int main(void)
     RUN(a_viewer_that_reads_nothing_is_closed);
     RUN(one_address_keeps_no_others_out);
     RUN(nothing_that_a_viewer_says_goes_up);
-    RUN(changes_of_triangles_are_refused_in_words);
+    RUN(parts_that_adapt_are_shown_right);
+    RUN(viewers_see_the_fields_that_they_ask_for);
     RUN(tickets_are_checked_with_the_keys);
     RUN(places_are_limited_and_nobody_comes_before_the_session);
     RUN(viewers_outlive_a_lost_line_but_not_the_run);

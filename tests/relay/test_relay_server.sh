@@ -1,6 +1,6 @@
 #!/bin/sh
 # palpate relay between a live server and its viewers: two at once, assets and page, the lock of the role, a server that
-# goes and comes back, a relay of a relay, and no simulation in it. usage: test_relay_server.sh FOLDER_OF_PROGRAMS
+# goes and comes back, a relay of a relay, fields, a surface that adapts, and no simulation in it. usage: test_relay_server.sh FOLDER_OF_PROGRAMS
 bin=$1
 . "$(dirname "$0")/../clients/rig.sh"
 
@@ -121,4 +121,30 @@ client edits "$url" --script idle --sculpt "$work/orders" --until orders=2
 check "two edits are done" $code == 0
 wait $edited
 check "a viewer passes every check through them" $? == 0
+stop $relay_job
+stop $server_job
+
+# a surface that adapts, pulled at the server, and its field: a viewer at a relay of the relay has both
+deltas() { sed -n "s/.*\"topology_deltas\":{[^}]*\"$1\":\([0-9.]*\).*/\1/p" "$2"; }
+"$bin/palpate" prepare --model adaptive --shape sphere --levels 3 -o "$work/sphere" --quiet || exit 1
+scene=$work/sphere/scene.json
+start_server --port 0
+start_relay four "$url"
+start_relay five "$relay"
+timeout 100 "$bin/palpate-client" "$relay" --json --script idle --tool none --slow 4000 --seconds 60 --until deltas=1,cycles=60 >"$work/slow" 2>"$work/slow.err" &
+slow=$!
+timeout 100 "$bin/palpate-client" "$relay" --json --script idle --tool none --field displacement --seconds 60 --until deltas=4,triangles=230,fields=4 >"$work/far" 2>"$work/far.err" &
+far=$!
+viewers "$relay" 2
+timeout 100 "$bin/palpate-client" "$url" --json --script pull --seconds 90 >"$work/pull" 2>"$work/pull.err" &
+pull=$!
+pids="$pids $pull"
+wait $far
+check "it passes every check of frames and triangles" $? == 0
+check "of more triangles than at the start" "$(deltas triangles "$work/far")" '>' 229
+wait $slow
+check "one that reads slowly does too" $? == 0
+client newcomer "$relay" --script idle --tool none --until deltas=1,triangles=230
+check "and one that comes later has them too" $code == 0
+stop $pull
 finish

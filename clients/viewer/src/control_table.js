@@ -62,6 +62,7 @@ export const SERVER_MESSAGES = Object.freeze(
             "component_reasons?": "texts",
             "component_required?": "numbers",
             "estimates?": "bool",
+            "relay?": "bool",
             "started?": "u32",
             "marks?": [{ time_s: "f64", text: "text" }],
             you: { id: "u16", role: "role", name: "text", "tool?": "tool" },

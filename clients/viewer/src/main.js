@@ -246,7 +246,7 @@ inputById("name").onchange = () => {
     connect();
 };
 // read-only access for tests and for the console
-const shown = { state, stage, input, marks, accuracy, plots, capture, cue, views, sculpt, highlight, inside };
+const shown = { state, stage, input, marks, panel, accuracy, plots, capture, cue, views, sculpt, highlight, inside };
 Object.defineProperty(window, "palpate", { value: shown });
 connect();
 draw();

@@ -245,11 +245,12 @@ export class Messages {
 
     /** @param {Of<"status">} status @returns {string} */
     stoppedText(status) {
+        const { state } = this.page;
         const stopped = status.parts?.filter((part) => part.frozen) ?? [];
-        const names = stopped.map(({ part }) => this.page.state.parts[part]?.name ?? String(part));
+        const names = stopped.map(({ part }) => state.parts[part]?.name ?? String(part));
         const reason = stopped[0]?.reason ?? textOf("notice.diverged");
         const who = names.length ? textOf("notice.stopped", { names: names.join(", ") }) : "";
-        return [who, reason, textOf("notice.reset_helps")].filter(Boolean).join(" ");
+        return [who, reason, state.hello?.relay ? "" : textOf("notice.reset_helps")].filter(Boolean).join(" ");
     }
 
     showTitle() {
@@ -300,7 +301,7 @@ export class Messages {
         if (htmlById("panel").hidden || !state.status) return;
         this.page.members.showOrders();
         state.figures.effects = effectsText(stage.effects);
-        panel.showStatus(state.status, state.figures, state.parts);
+        panel.showStatus(state.status, state.figures, state.parts, !state.hello?.relay);
         htmlById("idle").textContent = idleText({
             field: state.field !== "none",
             estimate: accuracy.opened,

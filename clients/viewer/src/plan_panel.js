@@ -113,9 +113,9 @@ export class PlanPanel {
         return cell;
     }
 
-    /** @param {import("./plan_list.js").BodyRemark[]} remarks */
-    showBodies(remarks) {
-        const key = JSON.stringify(remarks);
+    /** @param {import("./plan_list.js").BodyRemark[]} remarks @param {boolean} resets a body that stands may be reset */
+    showBodies(remarks, resets) {
+        const key = JSON.stringify([remarks, resets]);
         if (key === this.shownRemarks) return;
         this.shownRemarks = key;
         this.bodies.replaceChildren(
@@ -127,7 +127,7 @@ export class PlanPanel {
                 title.textContent = name;
                 item.append(title, state ? ` ${textOf(state === "stopped" ? "body.stopped" : "body.asleep")}` : "");
                 item.append(...text.map((line) => Object.assign(document.createElement("p"), { textContent: line })));
-                if (frozen) {
+                if (frozen && resets) {
                     const reset = Object.assign(document.createElement("button"), {
                         textContent: textOf("body.reset", { name }),
                     });
@@ -143,8 +143,9 @@ export class PlanPanel {
      * @param {import("./control_table.js").Status} status
      * @param {import("./app_state.js").AppState["figures"]} figures of this page
      * @param {{name: string}[]} parts of `hello`
+     * @param {boolean} resets a body that stands may be reset
      */
-    showStatus(status, figures, parts) {
+    showStatus(status, figures, parts, resets) {
         const { paused, slowdown } = status;
         const ms = (/** @type {number} */ v, /** @type {number} */ digits) => `${decimal(v.toFixed(digits))} ms`;
         const speed = paused ? "–" : slowdown <= 1.02 ? textOf("state.real_time") : speedText(slowdown);
@@ -160,7 +161,7 @@ export class PlanPanel {
         this.figure("details.received", rateText(figures.bytes_s), true);
         this.figure("details.vertices", figures.vertices.toLocaleString(language), true);
         this.showActivity(activeText(status.active ?? [], parts));
-        this.showBodies(bodyRemarks(status.parts ?? [], parts));
+        this.showBodies(bodyRemarks(status.parts ?? [], parts), resets);
         const lengths = barLengths(status.component_ms);
         for (const { bar, value, index } of this.bars) {
             if (index === null) continue;

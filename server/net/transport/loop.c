@@ -11,8 +11,8 @@
 #include <string.h>
 #include <sys/resource.h>
 
-/* files beside sockets: logs, recordings, scenes that are read */
-enum { OTHER_FILES = 256 };
+/* files beside sockets: logs, recordings, scenes that are read. A socket with a higher number is closed at once */
+enum { OTHER_FILES = 1024 };
 
 struct pal_loop {
     struct lws_context *context;
@@ -60,30 +60,42 @@ static void wake_due(lws_sorted_usec_list_t *timer)
     if (loop->events.wake) loop->events.wake(loop->events.user);
 }
 
-/* systems begin with some hundred files a process and let it raise that; what is refused shows when they are used up */
-static void allow_files(int n)
+/* Sets how many files the process may have: systems begin with some hundred and let it raise that; what is refused
+ * shows when they are used up. The result is the number before; 0: unknown */
+static rlim_t allow_files(rlim_t n)
 {
     struct rlimit limit;
-    if (getrlimit(RLIMIT_NOFILE, &limit) || limit.rlim_cur >= (rlim_t)n) return;
-    limit.rlim_cur = (rlim_t)n < limit.rlim_max ? (rlim_t)n : limit.rlim_max;
+    if (getrlimit(RLIMIT_NOFILE, &limit)) return 0;
+    const rlim_t before = limit.rlim_cur;
+    limit.rlim_cur = n < limit.rlim_max ? n : limit.rlim_max;
     (void)setrlimit(RLIMIT_NOFILE, &limit);
+    return before;
+}
+
+/* lws finds a socket by its number in a table of as many entries as the process may have files, which may be a thousand
+ * million; with a limit of its own it searches all sockets for each event instead. So the limit is that of the process
+ * while the table is made */
+static struct lws_context *create_context(const struct lws_context_creation_info *info, int max_socket)
+{
+    const rlim_t n = (rlim_t)max_socket + OTHER_FILES, before = allow_files(n);
+    struct lws_context *context = lws_create_context(info);
+    if (before > n) (void)allow_files(before);
+    return context;
 }
 
 static pal_err open_context(pal_loop *loop, int max_socket, bool tls, pal_diagnostic *diag)
 {
     struct lws_context_creation_info info;
     memset(&info, 0, sizeof info);
-    allow_files(max_socket + OTHER_FILES);
     lws_set_log_level(LLL_ERR | LLL_WARN, lws_line);
     /* with it every host loads the certificates of all authorities, and only one that speaks TLS frees them */
     info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS | (tls ? LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT : 0);
     info.port = CONTEXT_PORT_NO_LISTEN_SERVER;
     info.user = loop;
-    info.fd_limit_per_thread = (unsigned)max_socket;
     /* one per socket, made on demand: with fewer, that many idle connections keep everybody else waiting */
     info.max_http_header_pool = (unsigned short)(max_socket < 4096 ? max_socket : 4096);
     info.timeout_secs = 5;
-    loop->context = lws_create_context(&info);
+    loop->context = create_context(&info, max_socket);
     if (!loop->context) return pal_diagnostic_set(diag, PAL_ERR_IO, "the network context could not be made");
     /* requests are matched to vhosts by port: this one must not look like a server */
     info.port = CONTEXT_PORT_NO_LISTEN;

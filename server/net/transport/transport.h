@@ -72,7 +72,7 @@ struct pal_transport_ops {
     /* copies events. REFUSED: names address and reason. [load] */
     pal_err (*open)(pal_loop *loop, pal_listen_address *address, const pal_peer_events *events, pal_diagnostic *diag,
                     pal_transport **out);
-    void (*ready)(pal_peer *peer);           /* next has a message */
+    void (*ready)(pal_peer *peer);           /* next may have a message; asks waiting */
     void (*drop)(pal_peer *peer);            /* drop_code is set: close as soon as possible */
     void (*close)(pal_transport *transport); /* after pal_loop_shut; closes the remaining peers. [load] */
 };

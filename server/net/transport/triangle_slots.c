@@ -1,6 +1,6 @@
-/* The server's triangle table. Every entry is compared when the revision changes (0.1 ms for 200,000). The uses of
- * each vertex are counted incrementally, so that the flags of hidden vertices need no extra pass. */
-#include "server/net/triangle_slots.h"
+/* Every entry is compared when the revision changes (0.1 ms for 200,000). The uses of each vertex are counted
+ * incrementally, so that the flags of hidden vertices need no extra pass. */
+#include "server/net/transport/triangle_slots.h"
 
 #include "protocol/topology_delta_codec.h"
 #include "server/base/log.h"
@@ -25,19 +25,19 @@ static void valid(const pal_triangle_slots *s, const int32_t from[3], uint32_t t
     for (int c = 0; c < 3; c++) tri[c] = good ? (uint32_t)from[c] : 0;
 }
 
-pal_err pal_triangle_slots_make(int part, uint32_t epoch, const pal_shown *shown, pal_diagnostic *diag,
-                                pal_triangle_slots **out)
+pal_err pal_triangle_slots_make(int part, const char *name, uint32_t epoch, const int32_t *tri, uint32_t n_slot,
+                                uint32_t n_vertex, pal_diagnostic *diag, pal_triangle_slots **out)
 {
-    if ((uint32_t)shown->n_tri > PAL_TRIANGLE_SLOT_MAX)
+    if (n_slot > PAL_TRIANGLE_SLOT_MAX)
         return pal_diagnostic_set(diag, PAL_ERR_BUDGET,
-                                  "part %s: %d triangles on its finest level, %u of a body that adapts can be streamed",
-                                  shown->name, shown->n_tri, PAL_TRIANGLE_SLOT_MAX);
+                                  "part %s: %u triangles on its finest level, %u of a body that adapts can be streamed",
+                                  name, n_slot, PAL_TRIANGLE_SLOT_MAX);
     pal_triangle_slots *s = calloc(1, sizeof *s);
     if (!s) return PAL_ERR_MEMORY;
     s->part = (uint16_t)part;
     s->epoch = epoch;
-    s->n_slot = (uint32_t)shown->n_tri;
-    s->n_vertex = (uint32_t)shown->n_vertex;
+    s->n_slot = n_slot;
+    s->n_vertex = n_vertex;
     s->revision = UINT64_MAX; /* the simulation may have changed the table since: compare the first frame */
     s->tri = calloc(3 * (size_t)s->n_slot + 1, sizeof *s->tri);
     s->written = calloc((size_t)s->n_slot + 1, sizeof *s->written);
@@ -46,7 +46,7 @@ pal_err pal_triangle_slots_make(int part, uint32_t epoch, const pal_shown *shown
     if (!s->tri || !s->written || !s->n_use || !s->hidden) return pal_triangle_slots_free(s), PAL_ERR_MEMORY;
     memset(s->hidden, 1, s->n_vertex);
     for (uint32_t i = 0; i < s->n_slot; i++) {
-        valid(s, shown->tri + 3 * (size_t)i, s->tri + 3 * (size_t)i);
+        valid(s, tri + 3 * (size_t)i, s->tri + 3 * (size_t)i);
         use(s, s->tri + 3 * (size_t)i, true);
     }
     *out = s;
