@@ -106,7 +106,7 @@ static void net_joined(pal_bridge_net *n)
 static void ws_control(void *user, const pal_control *c)
 {
     pal_bridge_net *n = user;
-    if (c->type == PAL_CONTROL_MOVE) pal_asset_store_move(n->store, c->move.address);
+    if (c->type == PAL_CONTROL_MOVE) pal_asset_store_move(n->store, c->move.address, c->move.session);
     if (c->type == PAL_CONTROL_HELLO || c->type == PAL_CONTROL_MEMBERS) n->count.tool = pal_link_tool(n->link);
     if (c->type == PAL_CONTROL_HELLO) {
         const pal_wire_hello *hello = &c->hello;

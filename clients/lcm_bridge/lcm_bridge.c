@@ -251,7 +251,7 @@ static void watcher_control(void *user, const pal_control *c)
     if (c->type == PAL_CONTROL_MOVE) {
         /* links of tools that are open move by themselves; this is for those opened later */
         snprintf(b->server, sizeof b->server, "%s?session=%s", c->move.address, c->move.session);
-        pal_asset_store_move(b->store, b->server);
+        pal_asset_store_move(b->store, c->move.address, c->move.session);
     }
     if (c->type == PAL_CONTROL_HELLO) {
         if (!b->named) memcpy(b->session, c->hello.session, sizeof b->session);

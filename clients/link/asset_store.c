@@ -1,6 +1,7 @@
 #include "clients/link/asset_store.h"
 #include "server/base/vec3.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -25,13 +26,13 @@ pal_asset_store *pal_asset_store_create(pal_link_loop *loop, const char *url,
     pal_asset_store *store = calloc(1, sizeof *store);
     if (!store) return NULL;
     *store = (pal_asset_store){.loop = loop, .changed = changed, .user = user};
-    pal_asset_store_move(store, url);
+    strncpy(store->url, url, sizeof store->url - 1);
     return store;
 }
 
-void pal_asset_store_move(pal_asset_store *store, const char *address)
+void pal_asset_store_move(pal_asset_store *store, const char *address, const char *session)
 {
-    strncpy(store->url, address, sizeof store->url - 1);
+    snprintf(store->url, sizeof store->url, "%s?session=%s", address, session);
 }
 
 void pal_asset_store_destroy(pal_asset_store *store)

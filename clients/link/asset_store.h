@@ -20,8 +20,8 @@ typedef struct pal_stored_asset {
 /* changed: called when an asset becomes ready or has failed. Borrows loop. url: of the server. NULL: out of memory */
 pal_asset_store *pal_asset_store_create(pal_link_loop *loop, const char *url,
                                         void (*changed)(void *user, const pal_stored_asset *a), void *user);
-/* what is fetched from now on comes from another server, with the same names; address: of a `move` */
-void pal_asset_store_move(pal_asset_store *store, const char *address);
+/* what is fetched from now on comes from another server, with the same names; address and session: of a `move` */
+void pal_asset_store_move(pal_asset_store *store, const char *address, const char *session);
 void pal_asset_store_destroy(pal_asset_store *store); /* after the loop is destroyed; NULL is fine */
 /* the asset of a path, fetched at the first call and again after a failure to connect; NULL: out of memory */
 pal_stored_asset *pal_asset_store_request(pal_asset_store *store, const char *path);

@@ -1,6 +1,7 @@
 /* The simplest client: one tool in one session, for programs that need no event loop of their own. It joins, fetches
  * the rest shape of the first part and calls `ready`; whoever has moved the tool is called when a step has used the
- * pose. After a reconnection `ready` is called again. Thread: that of pal_tool_client_run, which calls back. */
+ * pose, which is sent again until then: a pose lasts for a quarter of a second. After a reconnection `ready` is called
+ * again. Thread: that of pal_tool_client_run, which calls back. */
 #ifndef PAL_LINK_TOOL_CLIENT_H
 #define PAL_LINK_TOOL_CLIENT_H
 #include "clients/link/asset_store.h"
@@ -20,7 +21,8 @@ struct pal_tool_client {
     pal_link_loop *loop;
     pal_link *link;
     pal_asset_store *store;
-    uint32_t seq, n_moved; /* of the newest pose, of the one before that was answered */
+    pal_wire_pose pose; /* the newest; seq 0: none */
+    uint32_t n_moved;   /* seq of the newest that was answered */
     pal_diagnostic *diag;
     pal_err err;
 };

@@ -460,7 +460,7 @@ static void client_on_control(void *user, const pal_control *c)
     pal_scripted_client *t = user;
     if (c->type == PAL_CONTROL_HELLO || c->type == PAL_CONTROL_MEMBERS) t->result.tool = pal_link_tool(t->link);
     if (c->type == PAL_CONTROL_MEMBERS) t->result.n_member = c->members.n_member;
-    if (c->type == PAL_CONTROL_MOVE) pal_asset_store_move(t->store, c->move.address);
+    if (c->type == PAL_CONTROL_MOVE) pal_asset_store_move(t->store, c->move.address, c->move.session);
     if (c->type == PAL_CONTROL_HELLO) client_hello(t, &c->hello);
     if (c->type == PAL_CONTROL_TOPOLOGY) {
         t->result.n_topology++;

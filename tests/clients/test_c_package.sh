@@ -30,7 +30,14 @@ check "the example is built" $? == 0
 
 make_scene
 start_server --port 0
-timeout 100 ./press "$url" >press.out
+# a server that pauses for longer than a pose lasts: the pose is sent again
+timeout 100 stdbuf -oL ./press "$url" >press.out 2>press.err &
+press=$!
+while [ "$(wc -l <press.out)" -lt 5 ] && kill -0 $press; do sleep 0.02; done
+kill -STOP "$server_pid"
+sleep 0.5
+kill -CONT "$server_pid"
+wait $press
 check "the example runs to its end" $? == 0
 check "steps" "$(wc -l <press.out)" == 61
 check "no force 10 mm above the tissue, N" "$(sed -n 's/^-10.0 mm //p' press.out | cut -d' ' -f1)" == 0
