@@ -225,7 +225,11 @@ static pal_packet *offer(const pal_control *hello)
     offered = *hello;
     offered.hello.relay = true;
     offered.hello.estimates = false;
-    return pal_control_put(text, sizeof text, &offered, &n) ? NULL : pal_packet_create(text, n, true);
+    pal_packet *packet = pal_control_put(text, sizeof text, &offered, &n) ? NULL : pal_packet_create(text, n, true);
+    if (!packet)
+        pal_log(PAL_LOG_WARN, "hello", "of %s is too long, or there is no memory: it is not shown",
+                hello->hello.session);
+    return packet;
 }
 
 void pal_relay_take_text(pal_relay_kept *k, const pal_control *c, const char *text, size_t n_byte)
@@ -375,6 +379,9 @@ uint32_t pal_relay_next_request(pal_relay_kept *k, uint32_t first, pal_relay_vie
     for (uint32_t i = 0; i < k->n_part && found == PAL_WIRE_PART_MAX; i++) {
         pal_relay_values *of = &k->values[(first + i) % k->n_part];
         *wanted = pal_relay_values_wanted(of);
+        /* a field that a topology has taken away would have the whole request refused */
+        wanted->fields &= k->fields[(first + i) % k->n_part];
+        if (!wanted->fields) wanted->interior = false;
         if (same_view(wanted, &of->asked)) continue;
         pal_relay_values_ask(of, *wanted);
         found = (first + i) % k->n_part;

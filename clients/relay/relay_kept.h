@@ -55,6 +55,7 @@ typedef struct pal_relay_kept {
     pal_relay_message text[PAL_RELAY_KINDS];
     pal_relay_message frame[PAL_WIRE_PART_MAX]; /* newest of closed cycles */
     uint32_t n_part, fields[PAL_WIRE_PART_MAX]; /* parts as shown, and the fields of each */
+    uint32_t epoch[PAL_WIRE_PART_MAX];          /* of what is shown */
     pal_relay_values values[PAL_WIRE_PART_MAX];
     pal_relay_message tools;
     pal_relay_triangles triangles[PAL_WIRE_PART_MAX]; /* of these frames; it says what is [up] */
@@ -64,8 +65,8 @@ typedef struct pal_relay_kept {
     pal_relay_asset *asset; /* list */
     size_t asset_bytes;     /* of them all */
     /* [up] */
-    uint32_t started, epoch[PAL_WIRE_PART_MAX]; /* of the run; of what is shown */
-    pal_packet *coming[PAL_WIRE_PART_MAX];      /* newest FRAME of a cycle that is open, or of an epoch to come */
+    uint32_t started;                      /* of the run */
+    pal_packet *coming[PAL_WIRE_PART_MAX]; /* newest FRAME of a cycle that is open, or of an epoch to come */
     uint32_t coming_epoch[PAL_WIRE_PART_MAX], coming_seq[PAL_WIRE_PART_MAX]; /* of these */
     uint32_t shown_seq[PAL_WIRE_PART_MAX];                                   /* of frame; 0: none */
     pal_packet *announced[PAL_RELAY_MEMBERS];   /* hello and topology until their assets are here; NULL: shown */

@@ -145,7 +145,8 @@ static void ask(void *user)
     request.field_subscription.interior = wanted.interior;
     request.field_subscription.energy = wanted.energy;
     pal_wire_field_put_set(wanted.fields, request.field_subscription.field);
-    if (pal_link_send_control(u->link, &request)) pal_log(PAL_LOG_WARN, "fields", "part %u is not asked for", part);
+    /* a full queue: all is asked for again */
+    if (pal_link_send_control(u->link, &request)) pal_relay_forget_requests(u->kept);
     u->next_part = part + 1;
 }
 

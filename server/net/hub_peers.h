@@ -11,7 +11,7 @@ void pal_hub_send(pal_client *client);    /* queues the hub's message; overflow 
 /* queues an error; returns false, so that a function that refuses can return it */
 bool pal_hub_refuse(pal_client *client, const char *code, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
-/* field NONE: ends the subscription for this part; interior: with the values inside */
+/* fields 0: ends the subscription for this part; interior: with the values inside */
 void pal_hub_set_fields(pal_client *client, int part, uint32_t fields, bool interior); /* bits 1 << pal_field */
 void pal_hub_set_energy(pal_client *client, int part, bool wanted);
 void pal_hub_set_estimate(pal_client *client, int body, bool wanted);

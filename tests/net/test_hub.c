@@ -229,7 +229,6 @@ static void slow_client_gets_coarser_frames_and_finer_ones_when_it_keeps_up(void
     end();
 }
 
-/* whatever tier a frame is of and however long its tissue has been at rest; mem_client counts those that do not grow */
 /* encoded once for all, but for the numbers of each */
 static void a_status_has_the_numbers_of_its_client(void)
 {
@@ -254,6 +253,7 @@ static void a_status_has_the_numbers_of_its_client(void)
     end();
 }
 
+/* whatever tier a frame is of and however long its tissue has been at rest; mem_client counts those that do not grow */
 static void numbers_grow_through_every_change_of_tier(void)
 {
     mem_client c, all;

@@ -131,7 +131,7 @@ scene=$work/sphere/scene.json
 start_server --port 0
 start_relay four "$url"
 start_relay five "$relay"
-timeout 100 "$bin/palpate-client" "$relay" --json --script idle --tool none --slow 4000 --seconds 60 --until deltas=1,cycles=60 >"$work/slow" 2>"$work/slow.err" &
+timeout 100 "$bin/palpate-client" "$relay" --json --script idle --tool none --slow 4000 --seconds 60 --until deltas=1,cycles=10 >"$work/slow" 2>"$work/slow.err" &
 slow=$!
 timeout 100 "$bin/palpate-client" "$relay" --json --script idle --tool none --field displacement --seconds 60 --until deltas=4,triangles=230,fields=4 >"$work/far" 2>"$work/far.err" &
 far=$!
