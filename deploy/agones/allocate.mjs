@@ -23,9 +23,10 @@ const usage = `usage: allocate.mjs SCENE [flags]
   --keep             stay, and open the session on another server whenever its own has ended and somebody was in it;
                      ends with the session
 Prints one JSON object for each server: address, session, ticket, server.`;
-const LOOK_MS = 500; // between two looks at the session
-const EMPTY_LOOKS = 4; // a server that ends has dropped its members up to a second before
-const ANSWER_MS = 5000; // for a look
+const POLL_MS = 500; // between two questions about the session
+const EMPTY_POLLS = 4; // a server that ends has dropped its members up to a second before
+const ANSWER_MS = 5000; // for an answer
+const within = () => ({ signal: AbortSignal.timeout(ANSWER_MS) });
 const text = (value) => ({ type: "string", default: value });
 const { values: flag, positionals } = parseArgs({
     allowPositionals: true,
@@ -62,6 +63,7 @@ async function post(url, body, headers = {}) {
         method: "POST",
         headers: { "Content-Type": "application/json", ...headers },
         body: JSON.stringify(body),
+        ...within(),
     });
     const json = await answer.json().catch(() => ({}));
     if (!answer.ok) throw new Error(`${url}: ${answer.status} ${json.error ?? json.message ?? ""}`);
@@ -79,18 +81,23 @@ async function allocate() {
 
 const wait = (ms) => new Promise((done) => setTimeout(done, ms));
 
-/** what the server lists of the session @param {string} at @param {RequestInit} request */
-async function find(at, request) {
-    const { sessions } = await (await fetch(`http://${at}/sessions`, request)).json();
+/** what the server lists of the session @param {string} at @param {Record<string, string>} headers */
+async function find(at, headers = {}) {
+    const { sessions } = await (await fetch(`http://${at}/sessions`, { headers, ...within() })).json();
     return sessions.find((one) => one.name === session);
 }
 
-/** the session runs when the server lists it; its opening takes as long as the scene and its recording take to load */
-async function open(at) {
+/**
+ * The session runs when the server lists it; its opening takes as long as the scene and its recording take to load. Tried a
+ * second time, it may have been opened by a request whose answer was lost.
+ */
+async function open(at, isRetry) {
     const headers = { Authorization: `Bearer ${makeTicket("instructor", 300)}` };
-    await post(`http://${at}/sessions`, { open: scene, name: session }, headers);
+    const before = isRetry && (await find(at, headers));
+    if (!before || before.state === "failed")
+        await post(`http://${at}/sessions`, { open: scene, name: session }, headers);
     for (;;) {
-        const own = await find(at, { headers });
+        const own = await find(at, headers);
         if (!own || own.state === "failed") throw new Error(`${scene} cannot be opened: ${own?.text ?? "it is gone"}`);
         if (own.state !== "opening") return;
         await wait(100);
@@ -114,9 +121,9 @@ async function route(at) {
     if (answer) throw new Error(`HAProxy: ${answer}`);
 }
 
-async function start() {
-    const server = await allocate();
-    await open(server.at);
+/** opens the session there and says where it is */
+async function start(server, isRetry = false) {
+    await open(server.at, isRetry);
     if (flag.admin) await route(server.at);
     const address = `${flag.site || `http://${server.at}`}/?session=${session}`;
     const ticket = makeTicket(flag.role, 3600, "--session", session);
@@ -124,46 +131,50 @@ async function start() {
     return server;
 }
 
+/** status of Agones' answer about a game server, 0: none; 404: it has ended @param {string} name */
+const statusOf = (name) =>
+    fetch(`${flag.api}/apis/agones.dev/v1/namespaces/${flag.namespace}/gameservers/${name}`, within())
+        .then((answer) => answer.status)
+        .catch(() => 0);
+
 /**
  * Waits until the session needs another server: true; or none any more, since it was ended or had nobody: false. A server
  * has ended when Agones has none of that name: it keeps the object until the pod is gone, so two never record one session.
  */
 async function needsAnother({ name, at }) {
-    const url = `${flag.api}/apis/agones.dev/v1/namespaces/${flag.namespace}/gameservers/${name}`;
-    const within = () => ({ signal: AbortSignal.timeout(ANSWER_MS) });
-    for (let nEmpty = 0; ; await wait(LOOK_MS)) {
-        const own = await find(at, within()).catch(() => null); // null: no answer
+    for (let nEmpty = 0; ; await wait(POLL_MS)) {
+        const own = await find(at).catch(() => null); // null: no answer
         if (own) {
             nEmpty = own.members + own.viewers > 0 ? 0 : nEmpty + 1;
-            if (nEmpty === EMPTY_LOOKS) console.error(`allocate: nobody is in ${session}`);
+            if (nEmpty === EMPTY_POLLS) console.error(`allocate: nobody is in ${session}`);
             continue;
         }
-        const status = await fetch(url, within())
-            .then((answer) => answer.status)
-            .catch(() => 0);
-        if (status === 404) return nEmpty < EMPTY_LOOKS;
+        const status = await statusOf(name);
+        if (status === 404) return nEmpty < EMPTY_POLLS;
         if (status === 200 && own !== null) return false;
     }
 }
 
-const complain = (error) =>
+const report = (error) =>
     console.error(`allocate: ${error.cause?.code ? `${error.message}: ${error.cause.code}` : error.message}`);
 
-/** the same on another server, as soon as there is one */
+/** the same on another server, as soon as there is one; on a third one only when that has ended */
 async function startAgain() {
-    for (;;)
+    for (let server = null, tried = null; ; await wait(POLL_MS))
         try {
-            return await start();
+            server ??= await allocate();
+            return await start(server, server === tried);
         } catch (error) {
-            complain(error);
-            await wait(LOOK_MS);
+            report(error);
+            tried = server;
+            if (server && (await statusOf(server.name)) === 404) server = null;
         }
 }
 
 try {
-    let server = await start();
+    let server = await start(await allocate());
     while (flag.keep && (await needsAnother(server))) server = await startAgain();
 } catch (error) {
-    complain(error);
+    report(error);
     process.exit(1);
 }
