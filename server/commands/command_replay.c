@@ -75,8 +75,9 @@ static pal_err replay(replay_run *run, const char *log, const char *scene, bool 
     if (strict && report->cut[0]) return PAL_REFUSE(diag, "%s", report->cut);
     pal_err err = pal_replay_run(log, run->input.studied.scene, &watch, report, diag);
     if (run->write_err) return *diag = run->write_diag, run->write_err;
-    if (!err && run->elements.folder) err = pal_vtk_series_end(&run->elements, diag);
-    return !err && run->surfaces.folder ? pal_vtk_series_end(&run->surfaces, diag) : err;
+    /* one folder gets its list although the other has nothing to list */
+    if (!err && run->surfaces.folder) err = pal_vtk_series_end(&run->surfaces, diag);
+    return !err && run->elements.folder ? pal_vtk_series_end(&run->elements, diag) : err;
 }
 
 static void print(const replay_run *run, const pal_replay_report *report)

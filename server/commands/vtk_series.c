@@ -131,7 +131,10 @@ pal_err pal_vtk_series_end(pal_vtk_series *s, pal_diagnostic *diag)
 {
     char path[PATH];
     pal_file_out out;
-    if (s->n_file == 0) return PAL_REFUSE(diag, "--vtu: no body of the scene has elements of volume");
+    if (s->n_file == 0)
+        return PAL_REFUSE(diag, "%s",
+                          s->scene ? "--vtp: the recording has no step"
+                                   : "--vtu: no body of the scene has elements of volume");
     if (fflush(s->to)) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for its list", s->folder);
     PAL_TRY(path_of(s, s->scene ? "surfaces.pvd" : "series.pvd", path, diag));
     PAL_TRY(pal_file_begin(&out, path, diag));
