@@ -24,12 +24,13 @@ struct pal_estimation {
     const _Atomic bool *stop;
     pal_scene *scene; /* the body alone, without tools and display */
     pal_estimate_state state;
-    pal_world *live;             /* the body as it runs */
-    const pal_component *solver; /* of it, if it solves systems to a tolerance, else NULL */
-    pal_solve_accuracy exact;    /* of steps without an algebraic error; the solver's own while it makes these */
-    double decades;              /* between the two tolerances, log10 */
-    double *first, *second;      /* [n_dof][3] */
-    double *apart;               /* last equilibrium of another model or law less the body's, m [n_node][3] */
+    pal_world *live;          /* the body as it runs */
+    bool solves;              /* its solver solves systems to a tolerance */
+    pal_solve_accuracy exact; /* of steps without an algebraic error; the solver's own while it makes these */
+    double decades;           /* between the two tolerances, log10 */
+    double *first, *second;   /* [n_dof][3] */
+    /* last equilibrium of another model or law, less where it is sought from, m [n_node][3] */
+    double *offset_m;
     /* springs: voxels for finite elements; n_hex 0: use those of the scene's mesh */
     pal_prepared voxels;
     bool springs, locks;
@@ -102,7 +103,8 @@ static const pal_component *solver_of(const pal_world *world)
 
 static void exchange_accuracy(pal_estimation *w)
 {
-    if (w->solver) w->solver->effect->inspect.accuracy(w->solver->self, &w->exact);
+    const pal_component *solver = solver_of(w->live);
+    if (w->solves) solver->effect->inspect.accuracy(solver->self, &w->exact);
 }
 
 /* how accurate steps without an algebraic error are: at least by a decade better than those of the live solver */
@@ -130,7 +132,7 @@ static pal_err make_live(pal_estimation *w, pal_diagnostic *diag)
     f->order = PAL_USUAL_ORDER;
     f->tolerance = f->configuration.tolerance > 0 ? f->configuration.tolerance : PAL_TOLERANCE_LIVE;
     if (!solve->effect->inspect.accuracy) return PAL_ERR_OK;
-    w->solver = solve;
+    w->solves = true;
     choose_exact(w);
     return PAL_ERR_OK;
 }
@@ -249,14 +251,14 @@ static pal_err take_state(pal_estimation *w)
     s->borne = malloc(3 * sizeof(double) * (size_t)body->n_node);
     s->external_force = calloc(3 * (size_t)body->n_node, sizeof(double));
     w->first = malloc(n * sizeof(double)), w->second = malloc(n * sizeof(double));
-    w->apart = calloc(3 * (size_t)body->n_node, sizeof(double));
+    w->offset_m = calloc(3 * (size_t)body->n_node, sizeof(double));
     for (int i = 0; i < pal_world_component_count(w->live); i++) {
         const pal_effect *effect = pal_world_component(w->live, i)->effect;
         if (effect->stage != PAL_STAGE_FORCE || s->n_component == PAL_ESTIMATE_COMPONENTS) continue;
         s->component[s->n_component] = effect->name;
         s->component_enabled[s->n_component++] = true;
     }
-    return s->x && s->v && s->load && s->external_force && s->borne && w->first && w->second && w->apart
+    return s->x && s->v && s->load && s->external_force && s->borne && w->first && w->second && w->offset_m
                ? PAL_ERR_OK
                : PAL_ERR_MEMORY;
 }
@@ -303,7 +305,7 @@ void pal_estimation_close(pal_estimation *w)
     pal_hexes_free(&w->voxels.hexes);
     free(w->scene);
     free(w->state.x), free(w->state.v), free(w->state.load), free(w->state.external_force), free(w->state.borne);
-    free(w->first), free(w->second), free(w->apart);
+    free(w->first), free(w->second), free(w->offset_m);
     pal_estimate_hierarchy_free(&w->family);
     free(w);
 }
@@ -368,15 +370,15 @@ static void find_time_parts(pal_estimation *w, pal_estimate *out)
     int n_sub = w->state.n_substep > 0 ? w->state.n_substep : 1, n_dof = w->state.n_dof;
     int n = (int)fmin(fmin(MAX_AHEAD, ceil(PAL_AHEAD_S / step_s)), fmax(1, PAL_AHEAD_MS / (4 * ms)));
     double live_ms = NAN, exact_ms = NAN, half_ms;
-    out->algebraic_m = w->solver ? NAN : 0;
-    if (w->solver && !make_steps(w, w->live, n, step_s, w->first, &live_ms)) return;
+    out->algebraic_m = w->solves ? NAN : 0;
+    if (w->solves && !make_steps(w, w->live, n, step_s, w->first, &live_ms)) return;
     exchange_accuracy(w);
     bool good = make_steps(w, w->live, n * n_sub, step_s / n_sub, w->second, &exact_ms);
-    if (good && w->solver) out->algebraic_m = pal_max_dist3(w->first, w->second, n_dof);
+    if (good && w->solves) out->algebraic_m = pal_max_dist3(w->first, w->second, n_dof);
     good = good && make_steps(w, w->live, 2 * n * n_sub, 0.5 * step_s / n_sub, w->first, &half_ms);
     exchange_accuracy(w);
     if (!good) return;
-    if (w->solver && n_sub == 1) w->prediction.decade = pow(fmax(exact_ms / live_ms, 1), 1 / w->decades);
+    if (w->solves && n_sub == 1) w->prediction.decade = pow(fmax(exact_ms / live_ms, 1), 1 / w->decades);
     out->time_m = pal_max_dist3(w->first, w->second, n_dof) / (1 - ldexp(1, -w->prediction.solver_order));
 }
 
@@ -422,19 +424,25 @@ static bool find_borne(pal_estimation *w)
     return true;
 }
 
-/* the equilibrium of another model or law, sought from where it was beside x the last time */
-static bool find_beside(pal_estimation *w, pal_rest_solution *other, const double *x, const pal_body *body)
+/* the equilibrium of another model or law, sought from where it was relative to x the last time, else from x */
+static bool find_other(pal_estimation *w, pal_rest_solution *other, const double *x, const pal_body *body)
 {
     const int n = 3 * w->state.n_node;
-    for (int i = 0; i < n; i++) w->second[i] = x[i] + w->apart[i];
-    const bool found = pal_rest_solution_find(other, &w->state, body, w->second, w->stop);
-    for (int i = 0; i < n; i++) w->apart[i] = found ? other->x[i] - x[i] : 0;
+    bool moved = false;
+    for (int i = 0; i < n; i++) {
+        w->second[i] = x[i] + w->offset_m[i];
+        moved = moved || w->offset_m[i] != 0;
+    }
+    bool found = pal_rest_solution_find(other, &w->state, body, w->second, w->stop);
+    /* the load may be another than the last time */
+    if (!found && moved && !(w->stop && *w->stop)) found = pal_rest_solution_find(other, &w->state, body, x, w->stop);
+    for (int i = 0; i < n; i++) w->offset_m[i] = found ? other->x[i] - x[i] : 0;
     return found;
 }
 
 static bool find_fine(pal_estimation *w, const pal_body *body)
 {
-    return w->springs ? find_beside(w, &w->fine, w->state.x, body)
+    return w->springs ? find_other(w, &w->fine, w->state.x, body)
                       : pal_rest_solution_find(&w->fine, &w->state, body, w->state.x, w->stop);
 }
 
@@ -519,7 +527,7 @@ static void compare_models(pal_estimation *w, const pal_body *body, pal_estimate
             w->shown.n > 0 ? pal_display_error_skin(&w->shown, w->state.x, 0) : pal_max_dist3(w->state.x, w->fine.x, n);
     else if (!w->model.world)
         out->model_m = !strcmp(model_text(&w->scene->body[0], "law", ""), "neo_hookean") ? 0 : (double)NAN;
-    else if (find_beside(w, &w->model, w->fine.x, body))
+    else if (find_other(w, &w->model, w->fine.x, body))
         out->model_m = pal_max_dist3(w->model.x, w->fine.x, n);
 }
 

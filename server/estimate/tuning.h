@@ -11,8 +11,8 @@
 /* displacement over the body's size below which it is rounding (E) */
 #define PAL_UNMOVED 1e-9
 /* Solver tolerances. Steps without an algebraic error are solved to this share of the live tolerance, but no better
- * than to the floor: the algebraic part is within 10 % of what a tolerance of 1e-10 gives (E). Then that of a live
- * solver unless set, and that of equilibria (A) */
+ * than to the floor unless the live one is near it: the algebraic part is within 10 % of what a tolerance of 1e-10
+ * gives (E). Then that of a live solver unless set, and that of equilibria (A) */
 #define PAL_EXACT_SHARE     3e-3
 #define PAL_TOLERANCE_EXACT 1e-9
 #define PAL_TOLERANCE_LIVE  1e-2
