@@ -30,7 +30,7 @@ typedef struct matrix {
     int32_t *start, *column; /* full rows, columns ascending [n + 1] [start[n]] */
     vec4 (*value)[3];        /* blocks, column by column [start[n]] */
     float *inverse;          /* 1 / D, 0 at fixed nodes [n] */
-    uint8_t *stale;          /* rows that are made anew [n] */
+    uint8_t *stale;          /* rows to be summed again [n] */
     float lambda;            /* no eigenvalue of D^-1 A is larger */
     vec4 *x, *b, *r, *d, *e; /* answer, right side, residual, direction and the next one [n] */
 } matrix;

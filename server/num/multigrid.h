@@ -78,13 +78,11 @@ void pal_multigrid_destroy(pal_multigrid *mg); /* NULL is fine */
 /* New values of the first level's cells that are marked in changed [n_cell], the first time and after an error all:
  * begin, then add, in ascending order, the matrices of all cells that are wanted and the lumped masses of all finest
  * nodes, then finish. Wanted are the marked cells and those that share a node with one; every row of the matrices that
- * a marked cell has a part in is made anew, here and on the coarser levels, by the same sums as when all are marked, so
- * that the result is the same to the bit. Whole are the largest eigenvalues of the smoothers and the factor of the
- * coarsest level. NUMERIC: the coarsest matrix is not positive definite; MEMORY. No cycle may follow then.
- *
- * For cuts: a cell may become softer, or nothing (a matrix of zeros), as long as the coarsest matrix stays positive
- * definite, which masses see to. A cut that gives a part of the mesh nodes of its own changes groups and nodes of the
- * levels: that is another hierarchy, and a pal_multigrid made of it */
+ * a marked cell has a part in is summed again, here and on the coarser levels, in the order of the whole, so that the
+ * result is the same to the bit. The largest eigenvalues of the smoothers and the factor of the coarsest level are
+ * always found in full. A cell may become nothing (a matrix of zeros) where masses keep the coarsest matrix positive
+ * definite; a cut that adds nodes needs another hierarchy. NUMERIC: the coarsest matrix is not positive definite;
+ * MEMORY. No solve may follow then */
 void pal_multigrid_begin(pal_multigrid *mg, const uint8_t *changed);
 bool pal_multigrid_wants(const pal_multigrid *mg, int cell);
 void pal_multigrid_add_cell(pal_multigrid *mg, int cell, double k[24][24]);

@@ -197,7 +197,6 @@ typedef struct transfer {
     const double *in;
     double *out, scale;
     const float *coarse; /* answer of the first coarser level */
-    bool zero;           /* x is 0, whatever it and q hold    */
 } transfer;
 
 /* b = scale in */
@@ -237,7 +236,7 @@ static void restrict_nodes(const transfer *t, int first, int end)
         if (start[i] == start[i + 1]) continue;
         const float share = 1 / (float)(start[i + 1] - start[i]);
         float v[3], *restrict to = levels->part + 4 * i;
-        for (size_t c = 0, at = (size_t)slot[i]; c < 3; c++, at += n) v[c] = share * (t->zero ? b[at] : b[at] - q[at]);
+        for (size_t c = 0, at = (size_t)slot[i]; c < 3; c++, at += n) v[c] = share * (b[at] - q[at]);
         if (t->warp->rotated)
             turn(t->warp->w + 9 * i, v, true, to);
         else
@@ -256,8 +255,8 @@ static void prolong_nodes(const transfer *t, int first, int end)
     for (int i = first; i < end; i++) {
         const int n_from = start[i + 1] - start[i];
         const float weight = t->mg->now.weight[slot[i]];
-        float v[3] = {0, 0, 0}, turned[3] = {0, 0, 0};
-        if (n_from == 0 && !t->zero) continue;
+        float v[3] = {0, 0, 0}, turned[3];
+        if (n_from == 0) continue;
         for (int k = start[i]; k < start[i + 1]; k++)
             for (int c = 0; c < 3; c++) v[c] += t->coarse[4 * grid->from[k] + c];
         if (t->warp->rotated)
@@ -265,8 +264,7 @@ static void prolong_nodes(const transfer *t, int first, int end)
         else
             memcpy(turned, v, sizeof v);
         for (size_t c = 0, at = (size_t)slot[i]; c < 3; c++, at += n) {
-            const float move = n_from > 0 ? turned[c] / (float)n_from : 0;
-            x[at] = t->zero ? move : x[at] + move;
+            x[at] += turned[c] / (float)n_from;
             q[at] = weight * x[at];
         }
     }
@@ -296,11 +294,11 @@ static void correct_stiff(pal_hex_multigrid *mg, const pal_warp *warp)
     weigh(mg, levels->x);
 }
 
-/* the coarse levels' part: x += W P A1^-1 P' W' (b - A x), of a sawtooth x = W P A1^-1 P' W' b */
+/* the coarse levels' part: x += W P A1^-1 P' W' (b - A x); of a sawtooth x and q are 0 */
 static void correct(pal_hex_multigrid *mg, pal_cycle cycle, const pal_warp *warp)
 {
-    transfer t = {.piece = restrict_nodes, .mg = mg, .warp = warp, .zero = cycle == PAL_CYCLE_SAWTOOTH};
-    if (!t.zero) multiply(mg, mg->levels->x);
+    transfer t = {.piece = restrict_nodes, .mg = mg, .warp = warp};
+    if (cycle == PAL_CYCLE_V) multiply(mg, mg->levels->x);
     run_transfer(&t);
     t.coarse = pal_multigrid_solve(mg->now.coarse, cycle, mg->levels->part, mg->levels->body->team);
     t.piece = prolong_nodes;
@@ -320,7 +318,12 @@ void pal_hex_multigrid_solve(pal_hex_multigrid *mg, pal_cycle cycle, const pal_w
     }
     const unsigned mode = pal_subnormals_flush();
     run_transfer(&(transfer){.piece = take_nodes, .mg = mg, .in = r, .scale = 1 / largest});
-    if (cycle == PAL_CYCLE_V) smooth(mg, smoother, true);
+    if (cycle == PAL_CYCLE_V) {
+        smooth(mg, smoother, true);
+    } else {
+        memset(mg->levels->x, 0, sizeof(float) * 3 * (size_t)mg->levels->n_slot);
+        memset(mg->levels->q, 0, sizeof(float) * 3 * (size_t)mg->levels->n_slot);
+    }
     correct_stiff(mg, warp);
     correct(mg, cycle, warp);
     correct_stiff(mg, warp);

@@ -6,17 +6,15 @@
  * with the number of nodes: 10 or 11 to 1e-6 (tests/sim/implicit/test_preconditioner.c). Strong contrasts of stiffness
  * have a factor of their own (stiff_nodes.h).
  *
- * An update makes anew what has a part of an element whose material has been edited since the last one
+ * An update makes again what has a part of an element whose material has been edited since the last one
  * (pal_elastic_hexes.edited): diagonal entries at its nodes, the coarse cell that contains it and what is above that
- * one (num/multigrid.h); the factor of the stiff nodes only where one of them is a node of it. Whole are the largest
- * eigenvalues and the coarsest level's factor, a third of the time of all (palpate bench edit). The bits are those of
- * levels made as a whole. All elements count as edited where the coefficients of M and K are others, masses have
- * changed, and where the body or the levels in use are not at rest. An element may be edited to any stiffness, nothing
- * too; a cut that severs nodes is another mesh and wants other levels.
+ * one (num/multigrid.h); the factor of the stiff nodes only where one of them is a node of it. The largest
+ * eigenvalues and the coarsest level's factor, a third of the time of all (palpate bench edit), are always found in
+ * full. The bits are those of levels made as a whole. All elements count as edited where the coefficients of M and K
+ * are others, masses have changed, and where the body or the levels in use are not at rest.
  *
- * Memory: the caller's arena, and the heap for the coarser levels, in make
- * and in the first refresh; the factors of the coarsest level and of stiff nodes use it in every update. Thread: [load]
- * to make, then [sim]. */
+ * Memory: the caller's arena, and the heap for the coarser levels, in make and in the first refresh; the factors of
+ * the coarsest level and of stiff nodes use it in every update. Thread: [load] to make, then [sim]. */
 #ifndef PAL_SIM_IMPLICIT_HEX_MULTIGRID_H
 #define PAL_SIM_IMPLICIT_HEX_MULTIGRID_H
 #include "server/base/spare_thread.h"
@@ -34,8 +32,7 @@ typedef struct pal_hex_levels {
     int32_t *group;           /* first slot [n_group] */
     float *x, *b, *d, *r, *q; /* answer, right side, direction, residual, product [3][n_slot] */
     float *part;              /* of residuals at nodes, x y z 0 [n_node][4] */
-    /* what an update makes anew: first level's cells with an edited element, nodes of such elements [n_cell] [n_node]
-     */
+    /* what an update makes again: the first level's cells with an edited element [n_cell], nodes of such [n_node] */
     uint8_t *changed_cell, *changed_node;
 } pal_hex_levels;
 

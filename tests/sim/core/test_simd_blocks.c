@@ -161,12 +161,13 @@ static void add_terms(const voxels *v, const pal_node_order *order, int block)
         }
 }
 
-static void check_parts(voxels *v, int n_part, double *force)
+/* false: the body is not worth dividing */
+static bool check_parts(voxels *v, int n_part, double *force)
 {
     const int n_block = v->blocks.n_lane / PAL_LANES, n = v->n_node;
     pal_part_blocks parts;
-    REQUIRE(!pal_node_order_divide(v->order, n_part, v->arena));
-    REQUIRE(!pal_part_blocks_make(&v->blocks, v->order, v->arena, &parts));
+    CHECK(!pal_node_order_divide(v->order, n_part, v->arena));
+    CHECK(!pal_part_blocks_make(&v->blocks, v->order, v->arena, &parts));
     memset(force, 0, sizeof *force * 6 * (size_t)n);
     pal_node_order_load(v->order, v->x);
     for (int b = 0; b < n_block; b++) add_terms(v, v->order, b);
@@ -183,6 +184,7 @@ static void check_parts(voxels *v, int n_part, double *force)
     }
     for (int p = 0; p < v->order->n_part && parts.first; p++)
         CHECK_LE(parts.first[p + 1] - parts.first[p], PAL_PART_MAX * n_block);
+    return parts.first != NULL;
 }
 
 /* whatever the number of parts, a node gets the sum of all blocks in their order, bit by bit */
@@ -198,12 +200,11 @@ static void parts_sum_as_one_thread_does(void)
         make(&v, size, keep[k % 3]);
         double *force = malloc(sizeof *force * 6 * (size_t)v.n_node + 1);
         REQUIRE(force != NULL);
-        if (v.n_cell > 0) check_parts(&v, 2 + k % 4, force);
-        n_divided += v.n_cell > 0;
+        n_divided += v.n_cell > 0 && check_parts(&v, 2 + k % 4, force);
         free(force);
         drop(&v);
     }
-    CHECK_LE(60, n_divided);
+    CHECK_LE(30, n_divided);
 }
 
 /* what two threads repeat of a body worth them: 2 of 25 layers and less */
