@@ -632,6 +632,31 @@ static void edits_leave_no_assets_and_frames_behind(void)
     end_relay();
 }
 
+/* the server would refuse the whole request, and so keep other viewers from other fields */
+static void a_field_that_an_edit_takes_away_is_not_asked_for(void)
+{
+    static const uint8_t bytes[] = {1, 2, 3};
+    static mem_client a; /* too large for the stack */
+    char path[PAL_WIRE_NAME_BYTES];
+    pal_relay_view wanted;
+    begin(false, (pal_relay_options){.max_viewers = 2});
+    mem_join(&a, down, "Ada", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    for (int i = 0; i < 5; i++) turn(FRAME_NS, NULL, &a, NULL);
+    mem_text(&a, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\",\"interior\":true}");
+    turn(FRAME_NS, NULL, &a, NULL);
+    CHECK_INT(kept.values[0].asked.fields, 1u << PAL_WIRE_FIELD_DISPLACEMENT_M);
+    asset_late = true;
+    path_of("/asset/", bytes, sizeof bytes, path);
+    announce(2, path, ""); /* a model without fields */
+    CHECK_INT(pal_relay_take_asset(&kept, path, bytes, sizeof bytes), PAL_ERR_OK);
+    CHECK_INT(pal_relay_next_request(&kept, 0, &wanted), 0);
+    CHECK_INT(wanted.fields + wanted.interior, 0);
+    CHECK_INT(pal_relay_next_request(&kept, 0, &wanted), PAL_WIRE_PART_MAX);
+    asset_late = false;
+    mem_end(&a);
+    end_relay();
+}
+
 int main(void)
 {
     if (!small_scene_make(&organ, "small")) return 1;
@@ -648,6 +673,7 @@ int main(void)
     RUN(viewers_outlive_a_lost_line_but_not_the_run);
     RUN(what_upstream_offers_and_nothing_names_is_refused);
     RUN(edits_leave_no_assets_and_frames_behind);
+    RUN(a_field_that_an_edit_takes_away_is_not_asked_for);
     pal_prepared_free(&organ.mesh);
     return check_report();
 }
