@@ -18,8 +18,19 @@
 #include <cholmod.h>
 #include <dlfcn.h>
 #include <math.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* METIS, which CHOLMOD orders large matrices by, takes SIGTERM and SIGABRT from the whole program while it works, by
+ * this function of the C library, and gives back a handler that is called once: the second SIGTERM ended a server at
+ * once, and one that came meanwhile jumped into METIS from any thread. Shared libraries find this definition first
+ * (tests/num/test_cholesky.c) */
+__attribute__((visibility("default"))) __sighandler_t __sysv_signal(int number, __sighandler_t handler)
+{
+    (void)number, (void)handler;
+    return SIG_DFL;
+}
 #include <unistd.h>
 
 /* what one thread needs to factor */

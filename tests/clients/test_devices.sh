@@ -43,6 +43,7 @@ PAL_FAKE=wall=1,error=0x302,error_at=500 bridge --server "$url" --device hdapi: 
 job=$!
 shows "$work/lost.err" $job 'error 0x302'
 check "a device that is lost is reported" $? == 0
-check "in one line" "$(grep -c 'error 0x302' "$work/lost.err")" == 1
+# a slow machine may see it answer, and fail, again
+check "in one line" "$(grep -c 'error 0x302' "$work/lost.err")" == $((1 + $(grep -c 'answers again' "$work/lost.err")))
 stop $job
 finish

@@ -10,6 +10,7 @@
 #include <SuiteSparse_config.h>
 #include <dirent.h>
 #include <float.h>
+#include <signal.h>
 
 /* requests for memory of the room (wrapped by the linker) and of CHOLMOD (by its own hook) are counted; the one with
  * number refuse is not met */
@@ -489,6 +490,28 @@ static void factors_on_the_threads_it_was_called_on(void)
 
 /* the k-th request for memory fails, for every k: an error code, nothing lost (the address sanitizer looks) and the old
  * factor at work */
+static void on_signal(int number)
+{
+    (void)number;
+}
+
+/* a handler that is called for every signal, not once, is still there when METIS has ordered the nodes */
+static void leaves_signals_alone(void)
+{
+    grid g = make_grid(12, 12, 12);
+    fill_grid(&g, 1e4, 1, 5, NULL);
+    const struct sigaction mine = {.sa_handler = on_signal, .sa_flags = SA_RESTART};
+    struct sigaction before, after;
+    pal_cholesky *f = NULL;
+    REQUIRE(!sigaction(SIGTERM, &mine, &before));
+    REQUIRE(!pal_cholesky_create(&g.a, g.fixed, &f));
+    sigaction(SIGTERM, &before, &after);
+    CHECK(after.sa_handler == on_signal);
+    CHECK_INT(after.sa_flags & (SA_RESETHAND | SA_NODEFER), 0);
+    pal_cholesky_destroy(f);
+    pal_arena_destroy(g.arena);
+}
+
 static void survives_every_request_for_memory_that_fails(void)
 {
     grid g = make_grid(4, 2, 2);
@@ -672,6 +695,7 @@ int main(void)
     RUN(refreshes_beside_the_factor_in_use);
     RUN(keeps_the_old_factor_when_a_refresh_fails);
     RUN(factors_on_the_threads_it_was_called_on);
+    RUN(leaves_signals_alone);
     RUN(survives_every_request_for_memory_that_fails);
     RUN(an_incomplete_factor_without_fill_is_whole);
     RUN_SERIAL(conjugate_gradients_gain_from_an_incomplete_factor); /* no thread of its own */
