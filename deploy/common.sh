@@ -81,5 +81,6 @@ fetch_viewer() {
 fetch_prometheus() {
     ! command -v prometheus >/dev/null 2>&1 && [ ! -x "$build/prometheus/usr/bin/prometheus" ] || return 0
     message "downloading prometheus"
+    mkdir -p "$build" || return 1
     (cd "$build" && apt-get download -q prometheus && dpkg -x prometheus_*.deb prometheus && rm prometheus_*.deb) >"$build/prometheus.log" 2>&1
 }
