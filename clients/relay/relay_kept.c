@@ -232,8 +232,20 @@ static pal_packet *offer(const pal_control *hello)
     return packet;
 }
 
+/* epochs only grow: viewers would take an older one for what they have */
+static bool is_older(const pal_relay_kept *k, const pal_wire_topology *t)
+{
+    for (uint32_t p = 0; p < t->n_part; p++)
+        if ((int32_t)(t->part[p].epoch - k->triangles[p].epoch) < 0) return true;
+    return false;
+}
+
 void pal_relay_take_text(pal_relay_kept *k, const pal_control *c, const char *text, size_t n_byte)
 {
+    if (c->type == PAL_CONTROL_TOPOLOGY && is_older(k, &c->topology)) {
+        pal_log(PAL_LOG_WARN, "topology", "of an older epoch is ignored");
+        return;
+    }
     const bool passed = c->type == PAL_CONTROL_HELLO || c->type == PAL_CONTROL_TOPOLOGY ||
                         c->type == PAL_CONTROL_MEMBERS || c->type == PAL_CONTROL_STATUS ||
                         c->type == PAL_CONTROL_ORDERS;

@@ -13,7 +13,7 @@
 typedef struct pal_relay_triangles {
     pal_triangle_slots *slots; /* as shown; NULL: none yet, or the part does not adapt. Under the caller's lock */
     /* [up] */
-    bool adaptive; /* as announced last, with its epoch and the path of its asset */
+    bool adaptive; /* as announced last, with its epoch, which every part has, and the path of its asset */
     uint32_t epoch;
     char asset[PAL_WIRE_NAME_BYTES];
     pal_triangle_table table;   /* of that epoch */

@@ -98,7 +98,8 @@ static void announce(bool hello, uint8_t new_epoch, uint8_t flags)
     } else
         message.topology = (pal_wire_topology){.n_part = 1, .part = {part}};
     at_once = flags & 1;
-    honest = honest && !(flags & 12); /* one part of an epoch is announced in two ways */
+    /* one part of an epoch is announced in two ways, or an epoch comes again */
+    honest = honest && !(flags & 12) && (hello || new_epoch >= epoch);
     if (hello || new_epoch != epoch) memcpy(table, start, sizeof table);
     if (hello) revision = 0; /* upstream may be another relay, which counts anew */
     epoch = new_epoch;

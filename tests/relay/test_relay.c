@@ -628,6 +628,9 @@ static void edits_leave_no_assets_and_frames_behind(void)
     CHECK_INT(kept_assets(), before + 1);
     CHECK_INT(kept.epoch[0], 40);
     CHECK(kept.frame[0].packet == NULL);
+    /* epochs only grow */
+    announce(39, path, "");
+    CHECK_INT(kept.epoch[0], 40);
     asset_late = false;
     end_relay();
 }

@@ -38,7 +38,7 @@ static const char small_beside[] =
                  "f 9 11 10\nf 9 10 12\nf 9 12 11\nf 10 11 12\n";
 
 static const pal_surface_scene adaptive = {
-    .label = -1, .adaptive = true, .unit_m = 1e-3, .material = {50000, 0.45, 1000, 4}};
+    .label = -1, .adaptive = true, .unit_m = 1e-3, .material = {50000, 0.45, 1000, 4, 0}};
 
 static pal_loaded_scene *from_text(const char *text, const pal_surface_scene *options, pal_surface_scene_report *report)
 {

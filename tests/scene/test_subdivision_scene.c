@@ -167,7 +167,7 @@ static void bare_cells_become_a_scene(void)
 {
     pal_loaded_scene *loaded = NULL;
     pal_diagnostic diag = {""};
-    const pal_surface_scene options = {.label = -1, .material = {9000, 0.4, 1100, 2}, .hold = 0.2, .up = {0, 1, 0}};
+    const pal_surface_scene options = {.label = -1, .material = {9000, 0.4, 1100, 2, 0}, .hold = 0.2, .up = {0, 1, 0}};
     REQUIRE(write_bricks("My Bricks.palcells"));
     if (pal_scene_from_cells(in_folder("My Bricks.palcells"), &options, &loaded, &diag)) CHECK_FAIL("%s", diag.text);
     REQUIRE(loaded != NULL);
