@@ -564,14 +564,14 @@ int command_solve(int argc, char **argv)
          "count\n"
          "whole (on)"},
         {"--least-fill", "SHARE", PAL_FLAG_NUMBER, &o->voxel.min_fill, 1e-6, 1,
-         "cut voxels with a smaller share inside are dropped (0.02 of hexahedra by octants;\n"
+         "cut voxels with a smaller share inside are dropped (0.02 of hexahedra by moments;\n"
          "else 0.25 with fill, or 0.02 where that would lose 2.5 % of the volume; 0.5 without)"},
         {"--align", "on|off", PAL_FLAG_WORD, &args.align, 0, 0,
          "on: voxels are shifted so that their faces lie where a support, else a material, ends inside the body;\n"
          "off: they begin at the bounding box of the surface (on)"},
-        {"--cut", "octants|share", PAL_FLAG_WORD, &args.cut, 0, 0,
-         "hexahedra that the surface cuts have their inside by octants, or spread over them as in a live body "
-         "(octants)"},
+        {"--cut", "moments|share", PAL_FLAG_WORD, &args.cut, 0, 0,
+         "hexahedra that the surface cuts are integrated over their inside (moment fitting), or it is spread over them "
+         "as in a live body (moments)"},
         {"--support", "surface|nodes", PAL_FLAG_WORD, &args.support, 0, 0,
          "surface: hexahedra stick to the surface that a support's region cuts out of the body, which voxels need not\n"
          "fit; nodes: the nodes in the region are held (surface)"},

@@ -106,7 +106,7 @@ static pal_err set_entries(const job *j, pal_body_def *body)
     else if (o->twist > 0 && o->twist < 1)
         return PAL_REFUSE(j->diag, "twist %g: it is for hex8_bbar of linear or corotational law, not for %s of law %s",
                           o->twist, o->element, o->law);
-    if (j->s->hex && !o->shares) PAL_TRY(pal_entry_put_bool(&body->model, "octants", true, j->diag));
+    if (j->s->hex && !o->shares) PAL_TRY(pal_entry_put_bool(&body->model, "moment_fitting", true, j->diag));
     pal_entry_init(&body->solver, "solver", "static_newton");
     PAL_TRY(pal_entry_put_number(&body->solver, "tolerance", o->tolerance > 0 ? o->tolerance : 1e-8, j->diag));
     PAL_TRY(pal_entry_put_number(&body->solver, "newton", NEWTON_A_STEP, j->diag));
@@ -116,13 +116,13 @@ static pal_err set_entries(const job *j, pal_body_def *body)
     return PAL_ERR_OK;
 }
 
-/* supports on their surface where the voxels' octants are known and the surface is closed */
+/* supports on their surface where the voxels' weights are known and the surface is closed */
 static pal_err set_supports(const job *j, pal_body_def *body)
 {
     pal_solution *s = j->s;
     pal_surface_topology topology = {.closed = false};
     bool surface =
-        s->hex && !j->options->hold_nodes && !j->options->shares && j->options->voxel.fill && s->mesh.hexes.octant;
+        s->hex && !j->options->hold_nodes && !j->options->shares && j->options->voxel.fill && s->mesh.hexes.weight;
     for (int k = 0; k < j->problem->n_support; k++)
         surface = surface && (!j->problem->support[k].region.all || j->problem->support[k].has_normal);
     if (surface && pal_surface_check(&s->mesh.surface, &topology))
@@ -302,8 +302,8 @@ static pal_err prepare(const job *j, const pal_surface *surface)
     if (s->hex && voxel.fill && !o->shares && !(voxel.min_fill > 0)) voxel.min_fill = PAL_FILL_MIN;
     PAL_TRY(pal_case_voxels(j->problem, surface, &voxel, &s->mesh, j->diag));
     if (o->shares) {
-        free(s->mesh.hexes.octant);
-        s->mesh.hexes.octant = NULL;
+        free(s->mesh.hexes.weight);
+        s->mesh.hexes.weight = NULL;
     }
     if (o->split > 1) PAL_TRY(pal_refine_voxels(&s->mesh, o->split, j->diag));
     pal_err err = pal_locate_create(&s->mesh.tets, s->hex ? &s->mesh.hexes : NULL, &s->locate);

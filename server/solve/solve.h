@@ -11,10 +11,11 @@ typedef struct pal_solve_options {
     pal_case_voxel_options voxel;
     /* each voxel is solved as split^3 voxels of its fill, which separates the element error from the border's; 0: 1 */
     int split;
-    bool hold_nodes;          /* supports hold the nodes in them; false: of hexahedra with fill their surface
-                                 (surface_supports.h) */
-    bool shares;              /* cut hexahedra have their inside spread evenly, as a live body has; false: by octants */
-    double twist;             /* of hex8_bbar, linear or corotational (elements/elastic_hex.h); 0: PAL_SOLVE_TWIST */
+    bool hold_nodes; /* supports hold the nodes in them; false: of hexahedra with fill their surface
+                        (surface_supports.h) */
+    bool shares;  /* cut hexahedra have their inside spread evenly, as a live body has; false: Gauss weights integrate
+                     over it */
+    double twist; /* of hex8_bbar, linear or corotational (elements/elastic_hex.h); 0: PAL_SOLVE_TWIST */
     double tolerance;         /* of the residual, relative to the loads; 0: 1e-8 */
     int max_newton;           /* NUMERIC after this many Newton iterations; 0: 400 */
     const char *linear;       /* "direct" | "pcg"; NULL: chosen automatically */

@@ -11,8 +11,8 @@
 
 /* of h^2: a smaller area is rounding */
 #define AREA_ROUNDING 1e-9
-/* of the edge of an octant: a region that reaches no further into voxels ends at their border */
-#define FITS 0.01
+/* of the edge of a voxel: a region that reaches no further into voxels ends at their border */
+#define FITS 0.005
 
 typedef struct maker {
     const pal_problem *problem;
@@ -74,16 +74,24 @@ static pal_err add_points(maker *m, int support, pal_quadrature_point *point, in
     return PAL_FREED(err, point);
 }
 
-/* part of octant i (of all voxels' octants) that lies in the box */
-static double part_within(const pal_prepared *mesh, size_t i, const double low[3], const double high[3])
+/* from and to [3]: where voxel e lies in the box, 0..1 of its edges; returns the part of it that does */
+static double overlap(const pal_prepared *mesh, int e, const double low[3], const double high[3], double from[3],
+                      double to[3])
 {
-    const double *corner = mesh->tets.x + 3 * (size_t)mesh->hexes.node[8 * (i / 8)], h = mesh->tets.edge_m / 2;
+    const double *corner = mesh->tets.x + 3 * (size_t)mesh->hexes.node[8 * (size_t)e], h = mesh->tets.edge_m;
     double part = 1;
     for (int c = 0; c < 3; c++) {
-        const double from = corner[c] + (i >> c & 1 ? h : 0);
-        part *= fmin(1, fmax(0, (fmin(high[c], from + h) - fmax(low[c], from)) / h));
+        from[c] = fmin(1, fmax(0, (low[c] - corner[c]) / h));
+        to[c] = fmax(from[c], fmin(1, (high[c] - corner[c]) / h));
+        part *= to[c] - from[c];
     }
     return part;
+}
+
+/* integral from 0 to x of the shape function (1 -+ sqrt 3 (2 x - 1)) / 2 of a Gauss point on the low or high side */
+static double shape_integral(bool is_high, double x)
+{
+    return (x + (is_high ? sqrt(3) : -sqrt(3)) * x * (x - 1)) / 2;
 }
 
 /* The region of a support holds nodes, all of whole voxels, and next to nothing of these. Of cut voxels nodes may lie
@@ -92,7 +100,7 @@ static bool fits(const pal_problem *problem, int support, const pal_prepared *me
 {
     const pal_box *box = &problem->support[support].region;
     const pal_tets *tets = &mesh->tets;
-    double low[3], high[3], deep = 0;
+    double low[3], high[3], from[3], to[3], deep = 0;
     bool any = false;
     if (problem->support[support].has_normal || box->all) return false;
     pal_sub3(low, box->low_m, tets->origin_m), pal_sub3(high, box->high_m, tets->origin_m);
@@ -103,18 +111,25 @@ static bool fits(const pal_problem *problem, int support, const pal_prepared *me
             if ((double)mesh->hexes.fill[i / 8] < 1 - FITS) return false;
             any = true;
         }
-        deep = fmax(deep, part_within(mesh, i, low, high));
+        if (i % 8 == 0) deep = fmax(deep, overlap(mesh, (int)(i / 8), low, high, from, to));
     }
     return any && deep < FITS;
 }
 
-/* the part of each octant of the voxels that lies in the region is empty */
+/* What lies in the region is left out: of each weight the part that a whole voxel's has there */
 static void leave_out(maker *m, const double low[3], const double high[3])
 {
     pal_hexes *hexes = &m->mesh->hexes;
-    for (size_t i = 0; i < 8 * (size_t)hexes->n_hex; i++) {
-        hexes->octant[i] *= (float)(1 - part_within(m->mesh, i, low, high));
-        if (i % 8 == 7) hexes->fill[i / 8] = pal_octant_sum(hexes->octant + i - 7);
+    for (int e = 0; e < hexes->n_hex; e++) {
+        double from[3], to[3], weight[8];
+        if (!(overlap(m->mesh, e, low, high, from, to) > 0)) continue;
+        for (int q = 0; q < 8; q++) {
+            double within = 1;
+            for (int c = 0; c < 3; c++)
+                within *= 2 * (shape_integral(q >> c & 1, to[c]) - shape_integral(q >> c & 1, from[c]));
+            weight[q] = (double)hexes->weight[8 * (size_t)e + (size_t)q] * (1 - within);
+        }
+        pal_hexes_set_weights(hexes, e, weight);
     }
 }
 

@@ -7,7 +7,7 @@
 #define PAL_SOLVE_SURFACE_SUPPORTS_H
 #include "server/solve/load_case.h"
 
-/* The problem's supports on voxels of measured octants, of which those within regions become empty. young_Pa: of all
+/* The problem's supports on voxels of measured weights, which lose what lies within regions. young_Pa: of all
  * materials, NaN: their own. locate: of the mesh's hexahedra. The caller frees out->item. REFUSED names a support that
  * meets nothing of the body; MEMORY */
 pal_err pal_surface_supports_make(const pal_problem *problem, double young_Pa, const pal_locate *locate,

@@ -20,8 +20,8 @@ static size_t cell(const int n[3], int x, int y, int z)
     return (size_t)x + (size_t)n[0] * ((size_t)y + (size_t)n[1] * (size_t)z);
 }
 
-/* voxel lattice with an empty layer around it; octant [n2][n1][n0][8], 0 where there is no voxel */
-static pal_err make_coarse(const pal_prepared *mesh, double low[3], int n[3], float **octant)
+/* voxel lattice with an empty layer around it; weight [n2][n1][n0][8], 0 where there is no voxel */
+static pal_err make_coarse(const pal_prepared *mesh, double low[3], int n[3], float **weight)
 {
     const pal_tets *t = &mesh->tets;
     double high[3];
@@ -31,29 +31,29 @@ static pal_err make_coarse(const pal_prepared *mesh, double low[3], int n[3], fl
         n[c] = (int)floor((high[c] - low[c]) / t->edge_m + 0.5) + 2;
         low[c] -= t->edge_m;
     }
-    *octant = calloc(8 * (size_t)n[0] * (size_t)n[1] * (size_t)n[2], sizeof **octant);
-    if (!*octant) return PAL_ERR_MEMORY;
+    *weight = calloc(8 * (size_t)n[0] * (size_t)n[1] * (size_t)n[2], sizeof **weight);
+    if (!*weight) return PAL_ERR_MEMORY;
     for (int e = 0; e < mesh->hexes.n_hex; e++) {
         int at[3];
         lattice_of(t, &mesh->hexes, e, low, t->edge_m, at);
-        float *to = *octant + 8 * cell(n, at[0], at[1], at[2]);
+        float *to = *weight + 8 * cell(n, at[0], at[1], at[2]);
         for (int q = 0; q < 8; q++)
-            to[q] = mesh->hexes.octant ? mesh->hexes.octant[8 * (size_t)e + (size_t)q] : mesh->hexes.fill[e] / 8;
+            to[q] = mesh->hexes.weight ? mesh->hexes.weight[8 * (size_t)e + (size_t)q] : mesh->hexes.fill[e] / 8;
     }
     return PAL_ERR_OK;
 }
 
-/* Octants of the fine voxel at `at`: each lies within one octant of the coarse voxel, whose inside is spread evenly.
- * Returns the fill. */
-static float fine_octants(const int n[3], const float *coarse, int split, const int at[3], float octant[8])
+/* Weights of the fine voxel at `at`: each of its octants has the weight of the Gauss point of the octant of the coarse
+ * voxel that it lies in. Returns the fill. */
+static float fine_weights(const int n[3], const float *coarse, int split, const int at[3], float weight[8])
 {
     const float *from = coarse + 8 * cell(n, at[0] / split, at[1] / split, at[2] / split);
     for (int q = 0; q < 8; q++) {
         int in = 0;
         for (int c = 0; c < 3; c++) in |= (2 * (at[c] % split) + (q >> c & 1) >= split) << c;
-        octant[q] = from[in];
+        weight[q] = from[in];
     }
-    return pal_octant_sum(octant);
+    return pal_weight_sum(weight);
 }
 
 /* the fine grid, with voxels where the coarse one has something inside */
@@ -61,7 +61,7 @@ static pal_err make_fine(const pal_prepared *mesh, const double low[3], const in
                          pal_voxels *out)
 {
     size_t n_cell = 1;
-    float octant[8];
+    float weight[8];
     *out = (pal_voxels){.edge_m = mesh->tets.edge_m / split};
     for (int c = 0; c < 3; c++) {
         out->n[c] = n[c] * split;
@@ -74,7 +74,7 @@ static pal_err make_fine(const pal_prepared *mesh, const double low[3], const in
     for (int z = 0; z < out->n[2]; z++)
         for (int y = 0; y < out->n[1]; y++)
             for (int x = 0; x < out->n[0]; x++)
-                if (fine_octants(n, coarse, split, (int[3]){x, y, z}, octant) > 0)
+                if (fine_weights(n, coarse, split, (int[3]){x, y, z}, weight) > 0)
                     out->kind[cell(out->n, x, y, z)] = 2, out->n_inside++;
     return PAL_ERR_OK;
 }
@@ -95,11 +95,11 @@ pal_err pal_refine_voxels(pal_prepared *mesh, int split, pal_diagnostic *diag)
     if (!err) err = make_fine(mesh, low, n, coarse, split, &fine);
     if (!err) err = pal_voxels_split(&fine, &tets);
     if (!err) err = pal_hexes_find(&tets, &hexes, diag);
-    if (!err) PAL_ARRAY(&err, hexes.octant, 8 * (size_t)hexes.n_hex);
+    if (!err) PAL_ARRAY(&err, hexes.weight, 8 * (size_t)hexes.n_hex);
     for (int e = 0; e < hexes.n_hex && !err; e++) {
         int at[3];
         lattice_of(&tets, &hexes, e, low, fine.edge_m, at);
-        hexes.fill[e] = fine_octants(n, coarse, split, at, hexes.octant + 8 * (size_t)e);
+        hexes.fill[e] = fine_weights(n, coarse, split, at, hexes.weight + 8 * (size_t)e);
     }
     free(coarse);
     pal_voxels_free(&fine);

@@ -292,9 +292,26 @@ static void turned_beam_converges(void)
         b.problem.support[0].has_normal = true;
         pal_set3(b.problem.support[0].normal, -1, 0, 0);
         turn_body(&b);
-        check_sizes(name[k], &b, 0.45);
+        check_sizes(name[k], &b, 0.5);
         close_body(&b);
     }
+}
+
+/* flat sides along the grid within voxels: 1.5, 2.5, 3.5, 4.5, 5.5 voxels across are as good as 2 and 3 whole ones */
+static void slender_beam_is_as_good_between_whole_voxels(void)
+{
+    static const int resolution[7] = {6, 8, 10, 12, 14, 18, 22};
+    static const double bound[7] = {1.3, 1.4, 0.9, 0.9, 0.9, 0.8, 0.7};
+    body b;
+    if (!open_reference("beam", "linear_nu030", &b)) return;
+    printf("  slender beam:");
+    for (int k = 0; k < 7; k++) {
+        const double rms = rms_of(&b, resolution[k], NULL);
+        printf(" %.2f", rms);
+        CHECK_LE(rms, bound[k]);
+    }
+    printf(" %% with 1.5, 2, 2.5, 3, 3.5, 4.5, 5.5 voxels across\n");
+    close_body(&b);
 }
 
 /* A round shaft twisted by its end: u = (turn / length) z (axis x r), which leaves its sections plane, so that a held
@@ -357,6 +374,7 @@ int main(void)
     RUN(gear_is_as_good_wherever_its_grid_begins);
     RUN(turned_gear_converges);
     RUN(turned_beam_converges);
+    RUN(slender_beam_is_as_good_between_whole_voxels);
     RUN(turned_shaft_twists_as_saint_venant_says);
     return check_report();
 }

@@ -31,8 +31,8 @@ static void the_body_stays_and_its_voxels_shrink(void)
         double h = p.tets.edge_m, volume = filled(&p), low[2] = {INFINITY, INFINITY}, min = 1, share = 1;
         float *octant = malloc(8 * sizeof *octant * (size_t)n_hex);
         double *corner = malloc(3 * sizeof *corner * (size_t)n_hex);
-        REQUIRE(octant && corner && p.hexes.octant);
-        memcpy(octant, p.hexes.octant, 8 * sizeof *octant * (size_t)n_hex);
+        REQUIRE(octant && corner && p.hexes.weight);
+        memcpy(octant, p.hexes.weight, 8 * sizeof *octant * (size_t)n_hex);
         for (int e = 0; e < n_hex; e++) memcpy(corner + 3 * e, p.tets.x + 3 * p.hexes.node[8 * e], 24);
         for (int i = 0; i < p.tets.n_node; i++) low[0] = fmin(low[0], p.tets.x[3 * i]);
         CHECK_INT(pal_refine_voxels(&p, split, &diag), 0);
@@ -61,9 +61,9 @@ static void the_body_stays_and_its_voxels_shrink(void)
                 int in = 0;
                 for (int c = 0; c < 3; c++)
                     in |= (x[c] - corner[3 * at + c] + (q >> c & 1 ? 0.75 : 0.25) * h / split > h / 2) << c;
-                worse += p.hexes.octant[8 * e + q] != octant[8 * at + in];
+                worse += p.hexes.weight[8 * e + q] != octant[8 * at + in];
             }
-            if (at < 0 || worse || p.hexes.fill[e] != pal_octant_sum(p.hexes.octant + 8 * e)) share = 0;
+            if (at < 0 || worse || p.hexes.fill[e] != pal_weight_sum(p.hexes.weight + 8 * e)) share = 0;
             min = fmin(min, (double)p.hexes.fill[e]);
         }
         CHECK_NEAR(share, 1, 0);

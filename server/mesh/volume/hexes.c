@@ -12,19 +12,44 @@
 
 /* relative to edge_m: error of node positions from single precision in a file, at some hundred voxels across */
 #define AWAY 1e-4
+/* a voxel that lacks less is whole: rounding */
+#define WHOLE 1e-6
 
 void pal_hexes_free(pal_hexes *hexes)
 {
-    PAL_FREE(hexes->node, hexes->fill, hexes->octant);
+    PAL_FREE(hexes->node, hexes->fill, hexes->weight);
     memset(hexes, 0, sizeof *hexes);
 }
 
-double pal_hexes_octants(const pal_hexes *hexes, int e, double min_fill, double octant[8])
+double pal_hexes_weights(const pal_hexes *hexes, int e, double min_fill, double weight[8])
 {
     const double fill = (double)hexes->fill[e], more = fmax(0, min_fill - fill) / 8;
     for (int q = 0; q < 8; q++)
-        octant[q] = (hexes->octant ? (double)hexes->octant[8 * (size_t)e + (size_t)q] : fill / 8) + more;
+        weight[q] = (hexes->weight ? (double)hexes->weight[8 * (size_t)e + (size_t)q] : fill / 8) + more;
     return fmax(fill, min_fill);
+}
+
+/* The nearest point of a cube on a plane of constant sum: all are shifted by the same, then clipped. The sum grows with
+ * the shift, which bisection finds */
+void pal_hexes_set_weights(pal_hexes *hexes, int e, const double weight[8])
+{
+    float *to = hexes->weight + 8 * (size_t)e;
+    double min_weight = weight[0], max_weight = weight[0], wanted = 0, shift = 0;
+    for (int q = 0; q < 8; q++)
+        wanted += weight[q], min_weight = fmin(min_weight, weight[q]), max_weight = fmax(max_weight, weight[q]);
+    double low = -max_weight, high = 0.125 - min_weight;
+    if (wanted > 1 - WHOLE) low = shift = high;
+    while ((min_weight < 0 || max_weight > 0.125) && high - low > 1e-9) {
+        double sum = 0;
+        shift = (low + high) / 2;
+        for (int q = 0; q < 8; q++) sum += fmin(fmax(weight[q] + shift, 0), 0.125);
+        if (sum < wanted)
+            low = shift;
+        else
+            high = shift;
+    }
+    for (int q = 0; q < 8; q++) to[q] = (float)fmin(fmax(weight[q] + shift, 0), 0.125);
+    hexes->fill[e] = pal_weight_sum(to);
 }
 
 /* The corners when the five are in the order of the splitter and the voxel is a cube: then their volumes are right. The
@@ -119,19 +144,17 @@ static pal_err find_grid(const pal_hexes *hexes, const pal_tets *tets, const pal
 
 typedef struct filler {
     const pal_voxels *grid;
-    int64_t *place; /* hexahedra by layer: index of the lowest octant in its layer, and number [n_hex][2] */
+    int64_t *place; /* hexahedra by layer: index in its layer, and number [n_hex][2] */
     int *start;     /* of each layer [n2+2]                                          */
-    float *octant;  /* [n_hex][8] */
+    pal_hexes *hexes;
 } filler;
 
-static void set_layer(void *self, int z, const double *share)
+static void set_layer(void *self, int z, const double *weight)
 {
-    filler *f = self;
-    const int64_t row = 2 * (int64_t)f->grid->n[0];
-    for (int i = f->start[z / 2]; i < f->start[z / 2 + 1]; i++) {
-        const double *from = share + f->place[2 * (size_t)i];
-        float *to = f->octant + 8 * f->place[2 * (size_t)i + 1] + 4 * (z & 1);
-        for (int k = 0; k < 4; k++) to[k] = (float)from[(k & 1) + row * (k >> 1)] / 8;
+    const filler *f = self;
+    for (int i = f->start[z]; i < f->start[z + 1]; i++) {
+        const int64_t *place = f->place + 2 * (size_t)i;
+        pal_hexes_set_weights(f->hexes, (int)place[1], weight + 8 * place[0]);
     }
 }
 
@@ -151,7 +174,7 @@ static void deal_layers(filler *f, const pal_hexes *hexes, const pal_tets *tets,
                 continue;
             }
             int64_t *to = f->place + 2 * (size_t)f->start[at[2] + 1]++;
-            to[0] = 2 * at[0] + 4 * (int64_t)g->n[0] * at[1], to[1] = (int64_t)e;
+            to[0] = at[0] + (int64_t)g->n[0] * at[1], to[1] = (int64_t)e;
         }
         for (int z = 0; pass == 0 && z < g->n[2]; z++) f->start[z + 2] += f->start[z + 1];
     }
@@ -162,24 +185,26 @@ pal_err pal_hexes_fill(pal_hexes *hexes, const pal_tets *tets, const pal_surface
     pal_voxels grid = {0};
     if (hexes->n_hex == 0) return PAL_ERR_OK;
     PAL_TRY(find_grid(hexes, tets, surface, &grid, diag));
-    filler f = {.grid = &grid};
+    pal_hexes filled = *hexes;
+    filler f = {.grid = &grid, .hexes = &filled};
     pal_err err = PAL_ERR_OK;
-    PAL_ARRAY(&err, f.octant, 8 * (size_t)hexes->n_hex);
+    filled.fill = filled.weight = NULL;
+    PAL_ARRAY(&err, filled.fill, (size_t)hexes->n_hex);
+    PAL_ARRAY(&err, filled.weight, 8 * (size_t)hexes->n_hex);
     PAL_ARRAY(&err, f.place, 2 * (size_t)hexes->n_hex);
     PAL_ZEROED(&err, f.start, grid.n[2] + 2);
     if (!err) {
         double shift[3];
         pal_sub3(shift, tets->origin_m, surface->origin_m);
         deal_layers(&f, hexes, tets, shift);
-        err = pal_voxels_fraction(surface, &grid, 2, set_layer, &f, diag);
+        err = pal_voxels_fraction(surface, &grid, true, set_layer, &f, diag);
     }
     PAL_FREE(f.place, f.start);
     if (err) {
-        PAL_FREE(f.octant);
+        PAL_FREE(filled.fill, filled.weight);
     } else {
-        free(hexes->octant);
-        hexes->octant = f.octant, hexes->measured = true;
-        for (size_t e = 0; e < (size_t)hexes->n_hex; e++) hexes->fill[e] = pal_octant_sum(f.octant + 8 * e);
+        PAL_FREE(hexes->fill, hexes->weight);
+        hexes->fill = filled.fill, hexes->weight = filled.weight, hexes->measured = true;
     }
     if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "out of memory for the fill of %d voxels", hexes->n_hex);
     return err;

@@ -104,12 +104,12 @@ static pal_err keep_hexes(const pal_hexes *from, const int32_t *label, const com
     to->measured = from->measured;
     PAL_ARRAY(&err, to->node, 8 * (size_t)from->n_hex);
     PAL_ARRAY(&err, to->fill, from->n_hex);
-    if (from->octant) PAL_ARRAY(&err, to->octant, 8 * (size_t)from->n_hex);
+    if (from->weight) PAL_ARRAY(&err, to->weight, 8 * (size_t)from->n_hex);
     if (err) return err;
     for (size_t e = 0; e < (size_t)from->n_hex; e++) {
         if (!part[label[5 * e]].keep) continue;
         for (size_t c = 0; c < 8; c++) to->node[8 * (size_t)to->n_hex + c] = number[from->node[8 * e + c]];
-        if (from->octant) memcpy(to->octant + 8 * (size_t)to->n_hex, from->octant + 8 * e, 8 * sizeof *to->octant);
+        if (from->weight) memcpy(to->weight + 8 * (size_t)to->n_hex, from->weight + 8 * e, 8 * sizeof *to->weight);
         to->fill[to->n_hex++] = from->fill[e];
     }
     return PAL_ERR_OK;

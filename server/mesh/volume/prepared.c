@@ -3,9 +3,9 @@
  * File, little-endian: head; eight u64 counts and four doubles (origin, h); an entry for each section; the sections,
  * each at a multiple of 64. The checksum is of all that follows the head. The counts alone fix every section's size, so
  * a file is either whole or refused, and no more is taken from the heap than the file has bytes. Of the hexahedra only
- * measured fill and octants are kept: their corners follow from the tetrahedra. A mesh without skin frames binds no
+ * measured fill and weights are kept: their corners follow from the tetrahedra. A mesh without skin frames binds no
  * vertex to any, so that a surface alone has counts of 0 but its own. Version 2 has no fill; version 4 adds image
- * coordinates, version 5 the octants of the fill. Each has a count and a section more than the one before, and a mesh
+ * coordinates, version 5 the weights of cut voxels. Each has a count and a section more than the one before, and a mesh
  * is written in the first that holds it. */
 #include "server/mesh/volume/prepared.h"
 
@@ -59,7 +59,7 @@ typedef struct section {
 static void list_sections(pal_prepared *p, const uint64_t count[N_COUNT], section out[N_SECTION])
 {
     uint64_t n_vertex = count[0], n_tri = count[1], n_node = count[2], n_tet = count[3], n_face = count[4],
-             n_frame = count[5], n_fan = count[6], n_fill = count[7], n_image_at = count[8], n_octant = count[9],
+             n_frame = count[5], n_fan = count[6], n_fill = count[7], n_image_at = count[8], n_weight = count[9],
              n_near = n_frame ? PAL_SKIN_NEIGHBOURS * n_vertex : 0;
     const section all[N_SECTION] = {{&p->surface.x, 8, 3 * n_vertex},
                                     {&p->surface.tri, 4, 3 * n_tri},
@@ -77,7 +77,7 @@ static void list_sections(pal_prepared *p, const uint64_t count[N_COUNT], sectio
                                     {&p->skin.coef, 4, 4 * n_near},
                                     {&p->hexes.fill, 4, n_fill},
                                     {&p->surface.image_at, 4, 9 * n_image_at},
-                                    {&p->hexes.octant, 4, 8 * n_octant}};
+                                    {&p->hexes.weight, 4, 8 * n_weight}};
     memcpy(out, all, sizeof all);
 }
 
@@ -94,7 +94,7 @@ static void get_counts(const pal_prepared *p, uint64_t count[N_COUNT])
                             n_fan,
                             n_fill,
                             p->surface.image_at ? p->surface.n_tri : 0,
-                            p->hexes.octant ? n_fill : 0};
+                            p->hexes.weight ? n_fill : 0};
     for (int k = 0; k < N_COUNT; k++) count[k] = (uint64_t)n[k];
 }
 
@@ -205,7 +205,7 @@ static size_t round_up(size_t n)
 pal_err pal_prepared_bytes(const pal_prepared *prepared, uint8_t **bytes_out, size_t *n_byte_out)
 {
     pal_prepared p = *prepared;
-    const uint32_t version = p.hexes.octant && p.hexes.measured ? VERSION_MAX
+    const uint32_t version = p.hexes.weight && p.hexes.measured ? VERSION_MAX
                              : p.surface.image_at               ? VERSION_IMAGE
                                                                 : VERSION;
     layout l = layout_of(version);
@@ -316,11 +316,12 @@ static const char *find_fault(const pal_prepared *p, const uint64_t count[N_COUN
         if (tets->on_surface[i] > 1) return "a surface tag is neither 0 nor 1";
     for (uint64_t i = 0; i < count[7]; i++)
         if (!(p->hexes.fill[i] >= 0 && p->hexes.fill[i] <= 1)) return "a voxel's fill is not within 0..1";
-    if (count[9] && count[9] != count[7]) return "not every voxel has octants";
+    if (count[9] && count[9] != count[7]) return "not every voxel has weights";
     for (uint64_t i = 0; i < 8 * count[9]; i++)
-        if (!(p->hexes.octant[i] >= 0 && p->hexes.octant[i] <= 0.125F)) return "an octant's fill is not within 0..1/8";
+        if (!(p->hexes.weight[i] >= 0 && p->hexes.weight[i] <= 0.125F))
+            return "a weight of a voxel is not within 0..1/8";
     for (uint64_t i = 0; i < count[9]; i++)
-        if (pal_octant_sum(p->hexes.octant + 8 * i) != p->hexes.fill[i]) return "octants do not sum to a voxel's fill";
+        if (pal_weight_sum(p->hexes.weight + 8 * i) != p->hexes.fill[i]) return "weights do not sum to a voxel's fill";
     if (count[8] && count[8] != count[1]) return "not every triangle has image coordinates";
     if (!all_finite_float(surface->image_at, 9 * count[8])) return "an image coordinate is not finite";
     return NULL;
@@ -376,8 +377,8 @@ static pal_err read_sections(const char *name, const uint8_t *bytes, size_t n_by
 /* the hexahedra of the checked tetrahedra; with the fill the file has, which must be theirs */
 static pal_err read_hexes(const char *name, uint64_t n_fill, pal_prepared *p, pal_diagnostic *diag)
 {
-    float *fill = p->hexes.fill, *octant = p->hexes.octant;
-    p->hexes.fill = p->hexes.octant = NULL;
+    float *fill = p->hexes.fill, *weight = p->hexes.weight;
+    p->hexes.fill = p->hexes.weight = NULL;
     pal_err err = pal_hexes_find(&p->tets, &p->hexes, NULL);
     if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "%s: out of memory for the voxels", name);
     if (err == PAL_ERR_REFUSED && n_fill == 0) err = PAL_ERR_OK;
@@ -385,11 +386,11 @@ static pal_err read_hexes(const char *name, uint64_t n_fill, pal_prepared *p, pa
         err = PAL_REFUSE(diag, "%s: fill of %llu voxels, the mesh has %d", name, (unsigned long long)n_fill,
                          p->hexes.n_hex);
     if (err || n_fill == 0) {
-        free(fill), free(octant);
+        free(fill), free(weight);
         return err;
     }
     free(p->hexes.fill);
-    p->hexes.fill = fill, p->hexes.octant = octant;
+    p->hexes.fill = fill, p->hexes.weight = weight;
     p->hexes.measured = true;
     return PAL_ERR_OK;
 }
@@ -412,8 +413,8 @@ pal_err pal_prepared_parse(const char *name, const uint8_t *bytes, size_t n_byte
             p.surface.image_at = NULL;
         }
         if (!count[9]) {
-            free(p.hexes.octant);
-            p.hexes.octant = NULL;
+            free(p.hexes.weight);
+            p.hexes.weight = NULL;
         }
         memcpy(p.tets.origin_m, place, 24);
         memcpy(p.surface.origin_m, p.tets.origin_m, 24);

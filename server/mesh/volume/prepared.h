@@ -31,7 +31,7 @@ pal_err pal_prepared_surface(const pal_surface *surface, pal_prepared *out);
 void pal_prepared_free(pal_prepared *prepared);
 pal_err pal_prepared_save(const pal_prepared *prepared, const char *path, pal_diagnostic *diag);
 pal_err pal_prepared_load(const char *path, pal_prepared *out, pal_diagnostic *diag);
-/* the same from memory (files of version 2 have no fill: it is 1, not measured; of 3 and 4 no octants): name is used in
+/* the same from memory (files of version 2 have no fill: it is 1, not measured; of 3 and 4 no weights): name is used in
  * messages only; every count, index and number is checked */
 pal_err pal_prepared_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_prepared *out,
                            pal_diagnostic *diag);

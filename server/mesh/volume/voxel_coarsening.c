@@ -9,11 +9,11 @@
 typedef struct grid {
     pal_voxels voxels; /* kind is set last    */
     size_t n_cell;
-    float *octant; /* what the eight voxels of a cell hold [n2][n1][n0][8] */
+    double *weight; /* of the Gauss points of a cell, from its eight voxels [n2][n1][n0][8] */
 } grid;
 
-/* the cell at x; octant: the one of it, may be NULL */
-static size_t cell(const grid *g, const double *x, size_t *octant)
+/* the cell at x; side: bits of the axes along which x lies in its upper half, may be NULL */
+static size_t cell(const grid *g, const double *x, size_t *side)
 {
     const pal_voxels *v = &g->voxels;
     size_t at[3], in = 0;
@@ -22,7 +22,7 @@ static size_t cell(const grid *g, const double *x, size_t *octant)
         at[c] = (size_t)floor(place);
         in |= (size_t)(place - floor(place) > 0.5) << c;
     }
-    if (octant) *octant = in;
+    if (side) *side = in;
     return at[0] + (size_t)v->n[0] * (at[1] + (size_t)v->n[1] * at[2]);
 }
 
@@ -30,6 +30,31 @@ static void middle(const pal_tets *tets, const pal_hexes *hexes, int e, double x
 {
     const double *corner = tets->x + 3 * (size_t)hexes->node[8 * (size_t)e];
     for (int c = 0; c < 3; c++) x[c] = corner[c] + 0.5 * tets->edge_m;
+}
+
+/* Adds the integrals of the cell's shape functions (voxel_fraction.h) over one of its voxels, whose own weights
+ * integrate them */
+static void add_voxel(const pal_hexes *hexes, int e, size_t side, double to[8])
+{
+    double weight[8];
+    pal_hexes_weights(hexes, e, 1e-6, weight);
+    for (size_t q = 0; q < 8; q++)
+        for (size_t p = 0; p < 8; p++) {
+            double shape = weight[p] / 8;
+            for (int c = 0; c < 3; c++) {
+                /* the point in the cell, -1..1 */
+                const double x = (side >> c & 1 ? 0.5 : -0.5) + (p >> c & 1 ? 0.5 : -0.5) / sqrt(3);
+                shape *= (1 + (q >> c & 1 ? sqrt(3) : -sqrt(3)) * x) / 2;
+            }
+            to[q] += shape;
+        }
+}
+
+static double fill_of(const double weight[8])
+{
+    double sum = 0;
+    for (int q = 0; q < 8; q++) sum += weight[q];
+    return sum;
 }
 
 static pal_err make_grid(const pal_tets *tets, const pal_hexes *hexes, const int shift[3], grid *g)
@@ -47,14 +72,14 @@ static pal_err make_grid(const pal_tets *tets, const pal_hexes *hexes, const int
         v->n[c] = (int)ceil((high[c] - v->low_m[c]) / v->edge_m - 1e-6);
         g->n_cell *= (size_t)v->n[c];
     }
-    PAL_ZEROED(&err, g->octant, 8 * g->n_cell);
+    PAL_ZEROED(&err, g->weight, 8 * g->n_cell);
     PAL_ZEROED(&err, v->kind, g->n_cell);
     for (int e = 0; e < hexes->n_hex && !err; e++) {
         double x[3];
-        size_t octant, at;
+        size_t side, at;
         middle(tets, hexes, e, x);
-        at = cell(g, x, &octant);
-        g->octant[8 * at + octant] = fmaxf(hexes->fill[e], 1e-6f) / 8;
+        at = cell(g, x, &side);
+        add_voxel(hexes, e, side, g->weight + 8 * at);
     }
     return err;
 }
@@ -64,13 +89,13 @@ static void keep_voxels(grid *g, double min_fill)
 {
     double all = 0, gone = 0;
     for (size_t i = 0; i < g->n_cell; i++) {
-        const double fill = (double)pal_octant_sum(g->octant + 8 * i);
+        const double fill = fill_of(g->weight + 8 * i);
         all += fill;
         if (fill < min_fill) gone += fill;
     }
     if (gone > COARSE_MAX_LOSS * all) min_fill = 0;
     for (size_t i = 0; i < g->n_cell; i++) {
-        const double fill = (double)pal_octant_sum(g->octant + 8 * i);
+        const double fill = fill_of(g->weight + 8 * i);
         if (fill > 0 && !(fill < min_fill)) g->voxels.kind[i] = 2, g->voxels.n_inside++;
     }
 }
@@ -78,7 +103,7 @@ static void keep_voxels(grid *g, double min_fill)
 pal_err pal_voxels_coarsen(const pal_tets *tets, const pal_hexes *hexes, const int shift[3], double min_fill,
                            pal_prepared *out, pal_diagnostic *diag)
 {
-    grid g = {.octant = NULL};
+    grid g = {.weight = NULL};
     pal_prepared p = {0};
     if (hexes->n_hex == 0) return PAL_REFUSE(diag, "there are no voxels to make larger");
     pal_err err = make_grid(tets, hexes, shift, &g);
@@ -87,15 +112,13 @@ pal_err pal_voxels_coarsen(const pal_tets *tets, const pal_hexes *hexes, const i
         err = pal_voxels_split(&g.voxels, &p.tets);
     }
     if (!err) err = pal_hexes_find(&p.tets, &p.hexes, diag);
-    if (!err) PAL_ARRAY(&err, p.hexes.octant, 8 * (size_t)p.hexes.n_hex);
+    if (!err) PAL_ARRAY(&err, p.hexes.weight, 8 * (size_t)p.hexes.n_hex);
     for (int e = 0; e < p.hexes.n_hex && !err; e++) {
         double x[3];
-        float *octant = p.hexes.octant + 8 * (size_t)e;
         middle(&p.tets, &p.hexes, e, x);
-        memcpy(octant, g.octant + 8 * cell(&g, x, NULL), 8 * sizeof *octant);
-        p.hexes.fill[e] = pal_octant_sum(octant);
+        pal_hexes_set_weights(&p.hexes, e, g.weight + 8 * cell(&g, x, NULL));
     }
-    free(g.octant);
+    free(g.weight);
     pal_voxels_free(&g.voxels);
     p.hexes.measured = true;
     if (err) {

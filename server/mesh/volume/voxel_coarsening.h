@@ -1,6 +1,6 @@
-/* Voxels of twice the edge that fill the same body: the octants of each are its eight voxels (0 for one that does not
- * exist), so the volume is the same. Every second plane of the fine mesh is a plane of the coarse one; `shift`
- * selects which. Heap; thread: [load]. */
+/* Voxels of twice the edge that fill the same body: the weights of each integrate over its eight voxels (nothing for
+ * one that does not exist), so the volume is the same. Every second plane of the fine mesh is a plane of the coarse
+ * one; `shift` selects which. Heap; thread: [load]. */
 #ifndef PAL_MESH_VOLUME_VOXEL_COARSENING_H
 #define PAL_MESH_VOLUME_VOXEL_COARSENING_H
 #include "server/mesh/volume/prepared.h"

@@ -97,24 +97,43 @@ static void write_kind(const pal_bits *inside, const pal_bits *border, uint8_t *
     }
 }
 
-/* border voxels of which less than min lies inside are dropped */
-typedef struct dropper {
-    pal_bits *border;
+/* voxels of which at least min lies inside */
+typedef struct filled_voxels {
+    pal_bits bits;
     double min;
-} dropper;
+} filled_voxels;
 
-static void drop_layer(void *self, int z, const double *fraction)
+static void take_layer(void *self, int z, const double *fraction)
 {
-    dropper *d = self;
-    for (int y = 0; y < d->border->n[1]; y++) {
-        uint64_t *row = pal_bits_row(d->border, y, z);
-        for (int w = 0; w < d->border->n_word; w++)
-            for (uint64_t left = row[w]; left; left &= left - 1) {
-                int x = 64 * w + __builtin_ctzll(left);
-                if (fraction[(size_t)y * (size_t)d->border->n[0] + (size_t)x] < d->min)
-                    row[w] &= ~((uint64_t)1 << (x & 63));
-            }
+    filled_voxels *f = self;
+    const int n_x = f->bits.n[0];
+    for (int y = 0; y < f->bits.n[1]; y++) {
+        uint64_t *row = pal_bits_row(&f->bits, y, z);
+        const double *from = fraction + (size_t)y * (size_t)n_x;
+        for (int x = 0; x < n_x; x++) row[x >> 6] |= (uint64_t)(from[x] >= f->min) << (x & 63);
     }
+}
+
+/* The border: filled voxels that faces join to the inside, some through others, as at an edge of the body. *n_dropped:
+ * of face neighbours that are not filled */
+static pal_err grow_border(const pal_bits *inside, const pal_bits *filled, pal_bits *border, int64_t *n_dropped)
+{
+    const size_t n_word = pal_bits_words(inside);
+    pal_bits kept, next;
+    int64_t n_before = -1, n_next = 0;
+    PAL_TRY(pal_bits_create(inside->n, &kept));
+    pal_err err = pal_bits_create(inside->n, &next);
+    while (!err && n_next > n_before) {
+        n_before = n_next;
+        for (size_t i = 0; i < n_word; i++) kept.word[i] = inside->word[i] | border->word[i], next.word[i] = 0;
+        find_border(&kept, &next);
+        *n_dropped = pal_bits_count(&next);
+        for (size_t i = 0; i < n_word; i++) border->word[i] |= next.word[i] & filled->word[i];
+        n_next = pal_bits_count(border);
+        *n_dropped -= n_next - n_before;
+    }
+    pal_bits_free(&kept), pal_bits_free(&next);
+    return err;
 }
 
 /* border, dropped border voxels, components, counts, budget, bytes */
@@ -124,12 +143,14 @@ static pal_err keep_voxels(const pal_surface *surface, const pal_bits *inside, c
     pal_bits border;
     pal_err err = PAL_ERR_OK;
     PAL_TRY(pal_bits_create(inside->n, &border));
-    if (options->border) find_border(inside, &border);
     if (options->border && options->min_fill > 0) {
-        dropper d = {&border, options->min_fill};
-        report->n_dropped = pal_bits_count(&border);
-        err = pal_voxels_fraction(surface, voxels, 1, drop_layer, &d, diag);
-        report->n_dropped -= pal_bits_count(&border);
+        filled_voxels filled = {.min = options->min_fill};
+        err = pal_bits_create(inside->n, &filled.bits);
+        if (!err) err = pal_voxels_fraction(surface, voxels, false, take_layer, &filled, diag);
+        if (!err) err = grow_border(inside, &filled.bits, &border, &report->n_dropped);
+        pal_bits_free(&filled.bits);
+    } else if (options->border) {
+        find_border(inside, &border);
     }
     /* components of all kept voxels */
     for (size_t i = 0; i < pal_bits_words(inside); i++) border.word[i] |= inside->word[i];

@@ -95,18 +95,18 @@ double pal_body_element_volume_m3(const pal_body *body, const int32_t *corner)
 
 void pal_body_corner_shares(const pal_body *body, int e, double *share)
 {
-    /* shape function of a corner at the Gauss points, by how many axes lead from it to the point's octant */
+    /* shape function of a corner at the Gauss points, by how many axes lead from it to the point */
     const double near = (1 + sqrt(1.0 / 3)) / 2, far = 1 - near;
     const double shape[4] = {near * near * near, near * near * far, near * far * far, far * far * far};
     const int n_corner = body->element ? body->n_corner : 4;
     const double fill = body->fill ? (double)body->fill[e] : 1;
-    if (body->octants && fill < 1) {
-        double octant[8];
-        pal_hexes_octants(body->hexes, e, PAL_FILL_MIN, octant);
+    if (body->moment_fitting && fill < 1) {
+        double weight[8];
+        pal_hexes_weights(body->hexes, e, PAL_FILL_MIN, weight);
         for (int c = 0; c < 8; c++) {
             share[c] = 0;
             for (int q = 0; q < 8; q++)
-                share[c] += octant[q] * shape[((c ^ q) & 1) + ((c ^ q) >> 1 & 1) + ((c ^ q) >> 2)];
+                share[c] += weight[q] * shape[((c ^ q) & 1) + ((c ^ q) >> 1 & 1) + ((c ^ q) >> 2)];
         }
         return;
     }

@@ -144,7 +144,7 @@ typedef struct pal_body {
     const int32_t *element;
     int n_element, n_corner;
     const int8_t *own_corner; /* corner with PAL_OWN_CORNER_MASS of each tetrahedron, -1: none; NULL: equal parts */
-    bool octants;             /* cut hexahedra have their inside by octants of hexes; false: spread evenly */
+    bool moment_fitting;      /* cut hexahedra have the weights of hexes; false: their inside is spread evenly */
     const struct pal_ground *ground; /* definition.h; NULL: none */
     const float *fill;          /* share of material in each element, or tetrahedron where element is NULL; NULL: 1 */
     pal_node_order *node_order; /* memory order of the nodes for kernels; NULL: none made        */
@@ -236,7 +236,7 @@ static inline double pal_body_tet_share(int own, int corner)
     return own < 0 ? 0.25 : corner == own ? PAL_OWN_CORNER_MASS : (1 - PAL_OWN_CORNER_MASS) / 3;
 }
 /* What each corner of element e (of the body's own, else a tetrahedron) has of the element's whole volume: its part of
- * the material. Cut hexahedra have the inside of each octant at its Gauss point. share [n_corner] [load, sim] */
+ * the material. Cut hexahedra have the weights of their Gauss points. share [n_corner] [load, sim] */
 void pal_body_corner_shares(const pal_body *body, int e, double *share);
 /* Density of a body whose mass is lumped from elements, as the hook `measure` adds it: mass and filled volume of each
  * node. [sim] */

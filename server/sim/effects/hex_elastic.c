@@ -2,9 +2,9 @@
  *
  * Keys: element ("hex8_bbar": mean dilatation, the default | "hex8": full integration), law ("corotational" |
  * "linear" | "neo_hookean"), fill (true: voxels that the surface cuts count by what is inside, at least
- * PAL_FILL_MIN), octants (false: the inside is spread evenly over the voxel; true: by octant),
- * twist (1: factor on the stiffness of twisting modes, elastic_hex.h), recover (true: recovery from
- * inversion, recovery/recovery.h; not for linear). */
+ * PAL_FILL_MIN), moment_fitting (false: the inside is spread evenly over the voxel; true: Gauss weights integrate over
+ * it), twist (1: factor on the stiffness of twisting modes, elastic_hex.h), recover (true: recovery from inversion,
+ * recovery/recovery.h; not for linear). */
 #include "server/sim/core/effect_list.h"
 #include "server/sim/elements/elastic_hex.h"
 
@@ -18,7 +18,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     if (element) options.element = PAL_HEX_FULL;
     PAL_TRY(pal_elastic_law_read(item, &options.law, build->diag));
     PAL_TRY(pal_entry_read_bool(item, "fill", &options.fill, build->diag));
-    PAL_TRY(pal_entry_read_bool(item, "octants", &options.octants, build->diag));
+    PAL_TRY(pal_entry_read_bool(item, "moment_fitting", &options.moment_fitting, build->diag));
     PAL_TRY(pal_entry_read_bool(item, "recover", &options.recover, build->diag));
     PAL_TRY(pal_entry_read_number(item, "twist", 0.01, 1, &options.twist, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));

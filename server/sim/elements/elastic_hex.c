@@ -74,8 +74,8 @@ static double find_weights(const pal_elastic_hexes *cubes, int e, double weight[
 {
     double sum = 0;
     if (!cubes->fill || !cubes->hexes->fill) return 1;
-    double fill = pal_hexes_octants(cubes->hexes, e, PAL_FILL_MIN, weight);
-    if (!cubes->octants) return fill;
+    double fill = pal_hexes_weights(cubes->hexes, e, PAL_FILL_MIN, weight);
+    if (!cubes->moment_fitting) return fill;
     for (int q = 0; q < 8; q++) sum += weight[q] = (1 - PAL_VOID_STIFFNESS) * weight[q] + PAL_VOID_STIFFNESS / 8;
     for (int q = 0; q < 8; q++) weight[q] /= sum;
     return sum;
@@ -84,9 +84,9 @@ static double find_weights(const pal_elastic_hexes *cubes, int e, double weight[
 /* whole: all weights are equal */
 static bool is_whole(const pal_elastic_hexes *cubes, int e)
 {
-    const float *octant = cubes->fill && cubes->octants ? cubes->hexes->octant + 8 * (size_t)e : NULL;
+    const float *weight = cubes->fill && cubes->moment_fitting ? cubes->hexes->weight + 8 * (size_t)e : NULL;
     bool equal = true;
-    for (int q = 1; octant && q < 8; q++) equal = equal && octant[q] == octant[0];
+    for (int q = 1; weight && q < 8; q++) equal = equal && weight[q] == weight[0];
     return equal;
 }
 
@@ -130,7 +130,7 @@ pal_err pal_hex_make(const pal_hex_options *options, pal_build *build, const cha
     *out = (pal_elastic_hexes){.law = options->law,
                                .element = options->element,
                                .fill = options->fill,
-                               .octants = options->octants && body->hexes->octant,
+                               .moment_fitting = options->moment_fitting && body->hexes->weight,
                                .recover = options->recover,
                                .twist = options->twist,
                                .implicit = body->implicit,

@@ -9,11 +9,11 @@
  * it is given. Voxels are too stiff; what they gain by softer twists does not depend on how many lie across a part, as
  * it does where bending is softened (Belytschko, Ong, Liu, Kennedy 1984, on stiffness against hourglass modes).
  *
- * Cut voxels with `octants`: each Gauss point has the inside of its octant v_q (pal_hexes) as its weight, as in the
- * finite cell method (Parvizian, Duester, Rank 2007), (1 - a) v_q + a / 8 so that what is outside has a share a of the
- * stiffness (PAL_VOID_STIFFNESS). hex8_bbar: the mean strain and the fluctuations about it have these weights
+ * Cut voxels with `moment_fitting`: the Gauss points have weights v_q that integrate over the inside (pal_hexes), as in
+ * the finite cell method (Parvizian, Duester, Rank 2007), (1 - a) v_q + a / 8 so that what is outside has a share a of
+ * the stiffness (PAL_VOID_STIFFNESS). hex8_bbar: the mean strain and the fluctuations about it have these weights
  * (elastic_hex_modes.h), so that the dilatation is that of the inside. Blocks of whole voxels have a kernel of their
- * own. Without octants they are whole ones with their fill as a factor.
+ * own. Without it they are whole ones with their fill as a factor.
  *
  * Recovery from inversion (corotational and neo_hookean): recovery/recovery.h, by the determinants of the edges at all
  * corners.
@@ -30,7 +30,7 @@ typedef enum pal_hex_element { PAL_HEX_BBAR, PAL_HEX_FULL } pal_hex_element;
 typedef struct pal_elastic_hexes {
     pal_elastic_law law;
     pal_hex_element element;
-    bool fill, octants, recover;
+    bool fill, moment_fitting, recover;
     double twist;
     bool implicit; /* the solver linearises */
     const pal_hexes *hexes;
@@ -69,8 +69,8 @@ typedef struct pal_elastic_hexes {
 typedef struct pal_hex_options {
     pal_elastic_law law;
     pal_hex_element element;
-    bool fill;    /* cut voxels have their inside alone ...                  */
-    bool octants; /* ... by octants; false: spread evenly over the voxel     */
+    bool fill;           /* cut voxels have their inside alone ...                  */
+    bool moment_fitting; /* ... by weights of their own; false: spread evenly over the voxel */
     bool recover;
     double twist; /* above 0, at most 1; below 1: hex8_bbar, linear or corotational */
 } pal_hex_options;

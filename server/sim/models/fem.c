@@ -2,12 +2,12 @@
  *
  * Keys: element ("hex8_bbar" | "hex8" | "tet4" | "tet10"; hex8_bbar where the prepared mesh has hexahedra, else tet4),
  * law ("corotational" | "linear" | "neo_hookean"), fill (true: a voxel that the surface cuts has mass and stiffness by
- * its share inside, at least PAL_FILL_MIN), octants, twist (hexahedra: as hex_elastic's).
+ * its share inside, at least PAL_FILL_MIN), moment_fitting, twist (hexahedra: as hex_elastic's).
  *
  * Components: hex_elastic or tet_elastic with the same keys, viscous where the material has damping, solver
  * implicit_euler. Under static_newton a neo_hookean body has no recovery, because the edges of a region are another
  * material: a corner inverted at a clamped edge is part of the discrete rest state. Masses are lumped: equal shares to
- * the corners, with octants by the shape functions at their Gauss points; tet10 by Hinton, Rock and
+ * the corners, with moment_fitting by the shape functions at their Gauss points; tet10 by Hinton, Rock and
  * Zienkiewicz (1976), 1/36 of an element to a corner and 4/27 to a middle node, which are all positive. tet10 has its
  * middle nodes behind the mesh's own, whose numbers (skin, supports) stay true.
  */
@@ -21,7 +21,7 @@
 
 typedef struct fem_choice {
     const char *element, *law; /* law NULL: the row's default */
-    bool fill, octants, hex;
+    bool fill, moment_fitting, hex;
     double twist; /* NaN: the row's default */
     int n_corner;
 } fem_choice;
@@ -36,7 +36,7 @@ static pal_err read_keys(pal_config_entry *item, const pal_build *build, fem_cho
     PAL_TRY(pal_entry_read_choice(item, "element", names, 4, &kind, build->diag));
     PAL_TRY(pal_entry_read_text(item, "law", &to->law, build->diag));
     PAL_TRY(pal_entry_read_bool(item, "fill", &to->fill, build->diag));
-    PAL_TRY(pal_entry_read_bool(item, "octants", &to->octants, build->diag));
+    PAL_TRY(pal_entry_read_bool(item, "moment_fitting", &to->moment_fitting, build->diag));
     PAL_TRY(pal_entry_read_number(item, "twist", 0.01, 1, &to->twist, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     to->element = names[kind], to->n_corner = corners[kind];
@@ -59,7 +59,7 @@ static pal_err list(pal_config_entry *item, pal_build *build, pal_component_list
     PAL_TRY(pal_entry_put_text(row, "element", k.element, build->diag));
     if (k.law) PAL_TRY(pal_entry_put_text(row, "law", k.law, build->diag));
     PAL_TRY(pal_entry_put_bool(row, "fill", k.fill, build->diag));
-    if (k.hex && k.octants) PAL_TRY(pal_entry_put_bool(row, "octants", true, build->diag));
+    if (k.hex && k.moment_fitting) PAL_TRY(pal_entry_put_bool(row, "moment_fitting", true, build->diag));
     if (k.hex && !isnan(k.twist)) PAL_TRY(pal_entry_put_number(row, "twist", k.twist, build->diag));
     const bool own_law = k.law && !strcmp(k.law, "neo_hookean") && !strcmp(build->def->solver.name, "static_newton");
     if (own_law) PAL_TRY(pal_entry_put_bool(row, "recover", false, build->diag));
@@ -151,7 +151,7 @@ static pal_err make_fill(const pal_build *build, const fem_choice *choice)
     for (int e = 0; e < body->n_element; e++)
         fill[e] = fmaxf(mesh->hexes.fill[choice->hex ? e : e / 5], (float)PAL_FILL_MIN);
     body->fill = fill;
-    body->octants = choice->hex && choice->octants && mesh->hexes.octant;
+    body->moment_fitting = choice->hex && choice->moment_fitting && mesh->hexes.weight;
     return PAL_ERR_OK;
 }
 

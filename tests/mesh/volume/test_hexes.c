@@ -1,6 +1,8 @@
 /* Voxels as hexahedra: found in the split, filled by their share inside the surface, dropped where that is small. */
+#include "server/base/vec3.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/mesh/volume/hexes.h"
+#include "server/mesh/voxel/voxel_fraction.h"
 #include "server/mesh/voxel/voxel_scanline.h"
 #include "tests/check.h"
 #include "tests/fixtures/shapes.h"
@@ -90,57 +92,115 @@ static void order_within_a_voxel_does_not_matter_but_the_cube_does(void)
     pal_surface_free(&cube);
 }
 
-/* octants of a ball: each is the fill of a voxel of half the edge, and they sum to the voxel's */
-static void octants_are_the_fill_of_voxels_of_half_the_edge(void)
+static double monomial(int m, const double x[3])
 {
-    pal_surface ball = shape_sphere(0.1);
-    pal_voxel_options options = {.resolution = 9, .border = true};
-    body b;
-    REQUIRE(make_body(&ball, &options, &b));
-    REQUIRE(!pal_hexes_fill(&b.hexes, &b.tets, &ball, NULL));
-    REQUIRE(b.hexes.octant);
-    /* the same lattice at half the edge, as one mesh of voxels */
-    pal_voxels fine = {.edge_m = b.voxels.edge_m / 2};
-    size_t n_cell = 1;
-    for (int k = 0; k < 3; k++) {
-        fine.n[k] = 2 * b.voxels.n[k], fine.low_m[k] = b.voxels.low_m[k], fine.origin_m[k] = b.voxels.origin_m[k];
-        n_cell *= (size_t)fine.n[k];
-    }
-    fine.kind = malloc(n_cell);
-    REQUIRE(fine.kind);
-    memset(fine.kind, 2, n_cell);
-    fine.n_inside = (int64_t)n_cell;
-    pal_tets tets;
-    pal_hexes half;
-    REQUIRE(!pal_voxels_split(&fine, &tets) && !pal_hexes_find(&tets, &half, NULL));
-    REQUIRE(!pal_hexes_fill(&half, &tets, &ball, NULL));
-    float *at = calloc(n_cell, sizeof *at);
-    REQUIRE(at);
-    for (int pass = 0; pass < 2; pass++) {
-        const pal_hexes *hexes = pass ? &b.hexes : &half;
-        const pal_tets *nodes = pass ? &b.tets : &tets;
-        double worst = 0;
-        for (size_t e = 0; e < (size_t)hexes->n_hex; e++) {
-            size_t place[3];
-            for (size_t k = 0; k < 3; k++)
-                place[k] = (size_t)((nodes->x[3 * (size_t)hexes->node[8 * e] + k] - fine.low_m[k]) / fine.edge_m + 0.5);
-            for (size_t q = 0; q < (pass ? 8 : 1); q++) {
-                size_t cell = (place[2] + (q >> 2)) * (size_t)fine.n[1];
-                cell = (cell + place[1] + (q >> 1 & 1)) * (size_t)fine.n[0] + place[0] + (q & 1);
-                if (pass == 0)
-                    at[cell] = hexes->fill[e];
-                else
-                    worst = fmax(worst, fabs((double)(hexes->octant[8 * e + q] - at[cell] / 8)));
-            }
-            CHECK(pal_octant_sum(hexes->octant + 8 * e) == hexes->fill[e]);
+    return (m & 1 ? x[0] : 1) * (m & 2 ? x[1] : 1) * (m & 4 ? x[2] : 1);
+}
+
+/* integrals of 1, x, y, xy, z, xz, yz, xyz over a closed surface: of tetrahedra from the origin, by a rule of degree 3
+ */
+static void integrate(const pal_surface *s, double sum[8])
+{
+    memset(sum, 0, 8 * sizeof *sum);
+    for (int t = 0; t < s->n_tri; t++) {
+        const double *x[3];
+        for (int k = 0; k < 3; k++) x[k] = s->x + 3 * s->tri[3 * t + k];
+        double normal[3];
+        pal_cross3(normal, x[1], x[2]);
+        const double volume = pal_dot3(x[0], normal) / 6;
+        for (int i = 0; i < 5; i++) {
+            double at[3] = {0, 0, 0};
+            for (int k = 0; k < 3; k++) pal_axpy3(at, i == 4 ? 0.25 : i == k ? 0.5 : 1.0 / 6, x[k]);
+            for (int m = 0; m < 8; m++) sum[m] += volume * (i == 4 ? -0.8 : 0.45) * monomial(m, at);
         }
-        /* corners are rounded to 1/65536 of the voxel, of which there are two kinds */
-        CHECK_LE(worst, 2e-5);
     }
-    free(at);
-    pal_hexes_free(&half), pal_tets_free(&tets), pal_voxels_free(&fine);
-    free_body(&b);
-    pal_surface_free(&ball);
+}
+
+typedef struct summer {
+    const pal_voxels *grid;
+    double sum[8];
+} summer;
+
+static void add_layer(void *self, int z, const double *weight)
+{
+    summer *s = self;
+    const pal_voxels *g = s->grid;
+    const double h = g->edge_m, far = 0.5 / sqrt(3);
+    for (int i = 0; i < g->n[0] * g->n[1]; i++)
+        for (int q = 0; q < 8; q++) {
+            double x[3] = {i % g->n[0], i / g->n[0], z};
+            for (int c = 0; c < 3; c++) x[c] = g->low_m[c] + h * (x[c] + 0.5 + (q >> c & 1 ? far : -far));
+            for (int m = 0; m < 8; m++) s->sum[m] += h * h * h * weight[8 * i + q] * monomial(m, x);
+        }
+}
+
+/* Gauss points with their weights integrate trilinear functions over the inside of every voxel, so over the body */
+static void weights_integrate_trilinear_functions_over_the_inside(void)
+{
+    uint64_t state = 5;
+    for (int turn = 0; turn < 3; turn++) {
+        pal_surface s = turn ? shape_ball(0.1, 64, 32, 0.2)
+                             : shape_box((double[3]){-0.1, -0.04, -0.03}, (double[3]){0.1, 0.05, 0.04});
+        shape_rotate(&s, &state);
+        for (int i = 0; i < s.n_vertex; i++) pal_axpy3(s.x + 3 * i, 1, (double[3]){0.03, 0.05, 0.07});
+        pal_voxels grid = {.n = {13, 13, 13}, .edge_m = 0.021, .low_m = {-0.11, -0.09, -0.07}};
+        summer made = {.grid = &grid};
+        double exact[8];
+        pal_diagnostic diag = {""};
+        integrate(&s, exact);
+        if (turn == 2) shape_invert(&s);
+        if (pal_voxels_fraction(&s, &grid, true, add_layer, &made, &diag)) CHECK_FAIL("%s", diag.text);
+        /* corners are rounded to 1/65536 of a voxel */
+        for (int m = 0; m < 8; m++) CHECK_NEAR(made.sum[m] / exact[m], 1, 2e-5);
+        pal_surface_free(&s);
+    }
+}
+
+/* A corner voxel of a box holds the product of what its intervals hold: along an axis of which f is inside the weights
+ * are (f -+ sqrt 3 f (f - 1)) / 2. Where one is negative or above 1/8 the nearest are taken that are not: what is
+ * within the limits is off by one number, what is at a limit by no less */
+static void a_corner_voxel_has_the_nearest_weights_within_the_limits(void)
+{
+    static const double part[4] = {0.5, 0.45, 0.2, 0.8};
+    for (int k = 0; k < 4; k++) {
+        const double f = part[k], side = 7 + f;
+        pal_surface box = shape_box((double[3]){0, 0, 0}, (double[3]){side, side, side});
+        pal_voxels grid = {.n = {10, 10, 10}, .edge_m = 1, .low_m = {-1, -1, -1}};
+        pal_tets tets;
+        pal_hexes hexes;
+        pal_diagnostic diag = {""};
+        const double wide[2] = {(f - sqrt(3) * f * (f - 1)) / 2, (f + sqrt(3) * f * (f - 1)) / 2};
+        double raw[8], shift = NAN;
+        int corner = -1, n_within = 0;
+        grid.kind = malloc(1000);
+        REQUIRE(grid.kind);
+        memset(grid.kind, 2, 1000);
+        grid.n_inside = 1000;
+        REQUIRE(!pal_voxels_split(&grid, &tets) && !pal_hexes_find(&tets, &hexes, &diag));
+        REQUIRE(!pal_hexes_fill(&hexes, &tets, &box, &diag));
+        for (int e = 0; e < hexes.n_hex; e++) {
+            const double *x = tets.x + 3 * hexes.node[8 * e];
+            if (x[0] > 6.5 && x[1] > 6.5 && x[2] > 6.5 && x[0] + x[1] + x[2] < 21.5) corner = e;
+        }
+        REQUIRE(corner >= 0);
+        const float *weight = hexes.weight + 8 * corner;
+        for (int q = 0; q < 8; q++) {
+            raw[q] = wide[q & 1] * wide[q >> 1 & 1] * wide[q >> 2];
+            CHECK(weight[q] >= 0 && weight[q] <= 0.125F);
+            if (!(weight[q] > 0 && weight[q] < 0.125F)) continue;
+            if (n_within++ == 0) shift = (double)weight[q] - raw[q];
+            CHECK_NEAR((double)weight[q] - raw[q], shift, 2e-5);
+        }
+        for (int q = 0; q < 8; q++) {
+            if (weight[q] <= 0) CHECK_LE(raw[q] + shift, 2e-5);
+            if (weight[q] >= 0.125F) CHECK_LE(0.125 - raw[q] - shift, 2e-5);
+        }
+        CHECK(n_within > 0);
+        if (k < 2) CHECK_NEAR(shift, 0, 2e-5);
+        CHECK_NEAR((double)hexes.fill[corner], f * f * f, 1e-4);
+        pal_hexes_free(&hexes), pal_tets_free(&tets), pal_voxels_free(&grid);
+        pal_surface_free(&box);
+    }
 }
 
 /* voxels that a surface only touches hold exactly nothing, those within it exactly everything, the rest what a plane
@@ -285,32 +345,59 @@ static void min_fill_leaves_the_voxels_of_the_reference_boxes(void)
 }
 
 /* what is dropped is what is nearly empty; a centre inside keeps its voxel however little it holds */
-static void min_fill_drops_border_voxels_only(void)
+typedef struct counter {
+    const pal_voxels *grid;
+    double min;
+    int64_t n;
+} counter;
+
+static void count_layer(void *self, int z, const double *fraction)
+{
+    counter *c = self;
+    (void)z;
+    for (int i = 0; i < c->grid->n[0] * c->grid->n[1]; i++) c->n += fraction[i] >= c->min;
+}
+
+/* every voxel of which that much is inside is kept, whether a face, an edge or a corner joins it to the inside */
+static void min_fill_keeps_every_voxel_that_is_filled_so_far(void)
 {
     uint64_t state = 3;
     pal_surface s = shape_join(shape_ball(0.1, 64, 32, 0.2), shape_octahedron(0.01));
     shape_rotate(&s, &state);
-    body all, some;
-    pal_voxel_options options = {.resolution = 20, .border = true};
-    REQUIRE(make_body(&s, &options, &all));
-    REQUIRE(!pal_hexes_fill(&all.hexes, &all.tets, &s, NULL));
-    options.min_fill = 0.3;
-    REQUIRE(make_body(&s, &options, &some));
-    REQUIRE(!pal_hexes_fill(&some.hexes, &some.tets, &s, NULL));
-    CHECK_INT(some.voxels.n_inside, all.voxels.n_inside);
-    CHECK_INT(some.voxels.n_border + some.report.n_dropped, all.voxels.n_border);
-    CHECK_INT(pal_tets_check(&some.tets, NULL), PAL_ERR_OK);
-    int n_small = 0, n_full_all = 0, n_full_some = 0;
-    for (int e = 0; e < all.hexes.n_hex; e++) n_full_all += all.hexes.fill[e] >= 0.3F;
-    for (int e = 0; e < some.hexes.n_hex; e++) {
-        n_full_some += some.hexes.fill[e] >= 0.3F;
-        n_small += some.hexes.fill[e] < 0.3F;
+    static const double min[2] = {0.3, 0.02};
+    for (int k = 0; k < 2; k++) {
+        pal_voxel_options options = {.resolution = 20, .border = true, .min_fill = min[k]};
+        body some;
+        REQUIRE(make_body(&s, &options, &some));
+        REQUIRE(!pal_hexes_fill(&some.hexes, &some.tets, &s, NULL));
+        CHECK_INT(pal_tets_check(&some.tets, NULL), PAL_ERR_OK);
+        counter c = {.grid = &some.voxels, .min = min[k]};
+        REQUIRE(!pal_voxels_fraction(&s, &some.voxels, false, count_layer, &c, NULL));
+        int n_small = 0;
+        for (int e = 0; e < some.hexes.n_hex; e++) n_small += (double)some.hexes.fill[e] < min[k];
+        CHECK_INT(some.hexes.n_hex - n_small, c.n);
+        CHECK_LE(n_small, (double)some.voxels.n_inside / 50); /* centres inside, in the octahedron's tips */
+        free_body(&some);
     }
-    CHECK_INT(n_full_some, n_full_all);
-    CHECK_LE(n_small, (double)some.voxels.n_inside / 50);
-    free_body(&all);
-    free_body(&some);
     pal_surface_free(&s);
+    /* a cube of 0.6, 1, 1, 1, 1 and 0.4 voxels along each axis */
+    static const double along[6] = {0.6, 1, 1, 1, 1, 0.4}, smallest[5] = {0.5, 0.3, 0.15, 0.1, 0.05};
+    pal_surface cube = shape_box((double[3]){0, 0, 0}, (double[3]){5, 5, 5});
+    for (int k = 0; k < 5; k++) {
+        pal_voxel_options options = {
+            .resolution = 5, .border = true, .min_fill = smallest[k], .ahead = {0.4, 0.4, 0.4}};
+        pal_voxels voxels;
+        int wanted = 125;
+        for (int i = 0; i < 216; i++) {
+            const int at[3] = {i % 6, i / 6 % 6, i / 36};
+            const bool is_border = at[0] == 5 || at[1] == 5 || at[2] == 5;
+            wanted += is_border && along[at[0]] * along[at[1]] * along[at[2]] >= smallest[k];
+        }
+        REQUIRE(!pal_voxels_fill(&cube, &options, &voxels, NULL, NULL));
+        CHECK_INT(voxels.n_inside + voxels.n_border, wanted);
+        pal_voxels_free(&voxels);
+    }
+    pal_surface_free(&cube);
 }
 
 /* two cubes that touch along an edge only */
@@ -380,13 +467,14 @@ int main(void)
 {
     RUN(every_voxel_is_found_with_its_corners_in_order);
     RUN(order_within_a_voxel_does_not_matter_but_the_cube_does);
-    RUN(octants_are_the_fill_of_voxels_of_half_the_edge);
+    RUN(weights_integrate_trilinear_functions_over_the_inside);
+    RUN(a_corner_voxel_has_the_nearest_weights_within_the_limits);
     RUN(a_box_fills_its_voxels_exactly);
     RUN(total_fill_is_the_volume_of_a_box_at_an_angle_and_of_a_ball);
     RUN(overlapping_hollow_and_open_bodies_are_filled_too);
     RUN(a_surface_that_is_not_the_meshs_is_refused);
     RUN(min_fill_leaves_the_voxels_of_the_reference_boxes);
-    RUN(min_fill_drops_border_voxels_only);
+    RUN(min_fill_keeps_every_voxel_that_is_filled_so_far);
     RUN(voxels_joined_by_an_edge_are_counted);
     RUN(rows_of_a_grid_within_the_surface_end_with_the_grid);
     RUN(a_surface_that_reaches_beyond_the_mesh_fills_it_alike);

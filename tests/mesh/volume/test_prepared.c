@@ -66,7 +66,7 @@ static void saved_and_loaded_is_the_same_to_the_bit(void)
     CHECK(p.hexes.measured && q.hexes.measured);
     CHECK(same(q.hexes.node, p.hexes.node, (size_t)p.hexes.n_hex * 32));
     CHECK(same(q.hexes.fill, p.hexes.fill, (size_t)p.hexes.n_hex * 4));
-    CHECK(same(q.hexes.octant, p.hexes.octant, (size_t)p.hexes.n_hex * 32));
+    CHECK(same(q.hexes.weight, p.hexes.weight, (size_t)p.hexes.n_hex * 32));
     CHECK(same(q.surface.origin_m, p.surface.origin_m, 24) && same(q.tets.origin_m, p.tets.origin_m, 24));
     CHECK_NEAR(q.tets.edge_m, p.tets.edge_m, 0);
     free(a);
@@ -144,21 +144,21 @@ static void fill_that_does_not_fit_is_refused(void)
     REQUIRE(!pal_prepared_bytes(&p, &bytes, &n));
     CHECK_INT(bytes[8], 5);
     /* the entry of section 15 begins behind ten counts, four doubles and fourteen entries */
-    uint64_t at, octants, few = (uint64_t)p.hexes.n_hex - 1, entry = 32 + 80 + 32 + 14 * 24;
-    memcpy(&octants, bytes + entry + 2 * 24 + 16, 8);
+    uint64_t at, weights, few = (uint64_t)p.hexes.n_hex - 1, entry = 32 + 80 + 32 + 14 * 24;
+    memcpy(&weights, bytes + entry + 2 * 24 + 16, 8);
     memcpy(&at, bytes + entry + 16, 8);
     CHECK_INT(parse_with(bytes, n, at, p.hexes.fill, 4, &diag), PAL_ERR_OK);
     CHECK_INT(parse_with(bytes, n, at, &(float){0.25F}, 4, &diag), PAL_ERR_REFUSED);
-    CHECK(strstr(diag.text, "octants do not sum to a voxel's fill"));
-    CHECK_INT(parse_with(bytes, n, octants, &(float){0.126F}, 4, &diag), PAL_ERR_REFUSED);
-    CHECK(strstr(diag.text, "an octant's fill is not within 0..1/8"));
+    CHECK(strstr(diag.text, "weights do not sum to a voxel's fill"));
+    CHECK_INT(parse_with(bytes, n, weights, &(float){0.126F}, 4, &diag), PAL_ERR_REFUSED);
+    CHECK(strstr(diag.text, "a weight of a voxel is not within 0..1/8"));
     CHECK_INT(parse_with(bytes, n, 32 + 9 * 8, &few, 8, &diag), PAL_ERR_REFUSED);
     CHECK_INT(parse_with(bytes, n, at, &(float){-0.25F}, 4, &diag), PAL_ERR_REFUSED);
     CHECK_INT(parse_with(bytes, n, at, &(float){1.001F}, 4, &diag), PAL_ERR_REFUSED);
     CHECK_INT(parse_with(bytes, n, at, &(float){NAN}, 4, &diag), PAL_ERR_REFUSED);
     CHECK(strstr(diag.text, "a voxel's fill is not within 0..1"));
-    free(bytes), free(p.hexes.octant);
-    p.hexes.octant = NULL;
+    free(bytes), free(p.hexes.weight);
+    p.hexes.weight = NULL;
     REQUIRE(!pal_prepared_bytes(&p, &bytes, &n));
     memcpy(bytes + entry - 16 + 8, &few, 8); /* two counts fewer */
     CHECK_INT(parse_with(bytes, n, 32 + 7 * 8, &few, 8, &diag), PAL_ERR_REFUSED);
@@ -179,20 +179,20 @@ static void fill_that_does_not_fit_is_refused(void)
     pal_prepared_free(&q);
 }
 
-/* written before there were octants: as now without them */
-static void a_file_of_version_3_has_fill_and_no_octants(void)
+/* written before there were weights: as now without them */
+static void a_file_of_version_3_has_fill_and_no_weights(void)
 {
     pal_prepared p, q;
     pal_diagnostic diag = {""};
     uint8_t *bytes;
     size_t n;
     REQUIRE(make_ball(&p, NULL));
-    free(p.hexes.octant);
-    p.hexes.octant = NULL;
+    free(p.hexes.weight);
+    p.hexes.weight = NULL;
     REQUIRE(!pal_prepared_bytes(&p, &bytes, &n));
     CHECK_INT(bytes[8], 3);
     REQUIRE(!pal_prepared_parse("three", bytes, n, &q, &diag));
-    CHECK(q.hexes.measured && !q.hexes.octant);
+    CHECK(q.hexes.measured && !q.hexes.weight);
     CHECK(same(q.hexes.fill, p.hexes.fill, (size_t)p.hexes.n_hex * 4));
     free(bytes);
     pal_prepared_free(&p);
@@ -274,7 +274,7 @@ int main(void)
     RUN(saved_and_loaded_is_the_same_to_the_bit);
     RUN(damaged_files_are_refused_with_their_place);
     RUN(fill_that_does_not_fit_is_refused);
-    RUN(a_file_of_version_3_has_fill_and_no_octants);
+    RUN(a_file_of_version_3_has_fill_and_no_weights);
     RUN(a_file_of_version_2_is_read_with_its_hexahedra);
     RUN(a_surface_alone_is_saved_and_loaded_to_the_bit);
     RUN(a_file_that_is_not_there_is_an_io_error);

@@ -16,7 +16,7 @@ static void begin(hex_body *b, int nx, int ny, int nz, const char *element, cons
     hex_body_begin(b, n, NULL, 0.01);
     pal_entry_put_text(&b->item, "element", element, NULL);
     pal_entry_put_text(&b->item, "law", law, NULL);
-    pal_entry_put_bool(&b->item, "octants", true, NULL);
+    pal_entry_put_bool(&b->item, "moment_fitting", true, NULL);
     if (element == elements[0] && law != laws[2]) pal_entry_put_number(&b->item, "twist", softer, NULL);
     b->def->material.poisson = 0.4;
     hex_cut_at_random(b, seed);
@@ -26,7 +26,7 @@ static void begin(hex_body *b, int nx, int ny, int nz, const char *element, cons
 static double weights(const hex_body *b, int e, double weight[8])
 {
     double sum = 0, octant[8];
-    pal_hexes_octants(&b->hexes, e, PAL_FILL_MIN, octant);
+    pal_hexes_weights(&b->hexes, e, PAL_FILL_MIN, octant);
     for (int q = 0; q < 8; q++) {
         weight[q] = (1 - PAL_VOID_STIFFNESS) * octant[q] + PAL_VOID_STIFFNESS / 8;
         sum += weight[q];
@@ -184,8 +184,8 @@ static void stiffness_is_semi_definite_for_any_weights(void)
             hex_body b;
             begin(&b, 1, 1, 1, elements[element], "linear", 100 + (uint64_t)k);
             if (k < 8)
-                for (int q = 0; q < 8; q++) b.hexes.octant[q] = q == k ? 0.125F : 0;
-            b.hexes.fill[0] = pal_octant_sum(b.hexes.octant);
+                for (int q = 0; q < 8; q++) b.hexes.weight[q] = q == k ? 0.125F : 0;
+            b.hexes.fill[0] = pal_weight_sum(b.hexes.weight);
             REQUIRE(hex_body_make(&b) == PAL_ERR_OK);
             double m[36][9], a[24][24], max = 0, pivot = INFINITY;
             const int lane = b.row->simd_blocks.place[0];
@@ -224,8 +224,8 @@ static void constant_strain_is_exact_on_an_inclined_cut(void)
                 double s = -0.02 * normal[0] - 0.021 * normal[1] - 0.019 * normal[2];
                 for (int k = 0; k < 3; k++) s += normal[k] * (low[k] + h * (i >> k & 1 ? 0.75 : 0.25));
                 /* the plane at s = 0 as if it were level in each octant */
-                b.hexes.octant[i] = (float)(fmin(1, fmax(0, 0.5 - s / h)) / 8);
-                if (i % 8 == 7) b.hexes.fill[i / 8] = pal_octant_sum(b.hexes.octant + i - 7);
+                b.hexes.weight[i] = (float)(fmin(1, fmax(0, 0.5 - s / h)) / 8);
+                if (i % 8 == 7) b.hexes.fill[i / 8] = pal_weight_sum(b.hexes.weight + i - 7);
             }
             REQUIRE(hex_body_make(&b) == PAL_ERR_OK);
             const int n = b.body.n_node;
