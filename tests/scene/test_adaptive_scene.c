@@ -1,31 +1,10 @@
 /* Scenes of model adaptive_springs: surfaces as they are, shapes, supports on open edges, what is refused; what is
  * saved loads to the same. */
 #include "server/mesh/geometry/procedural.h"
-#include "server/scene/scene_file.h"
 #include "server/sim/surface/adaptive_surface.h"
-#include "server/sim/world/world.h"
-#include "tests/check.h"
+#include "tests/fixtures/scene_files.h"
 
 #include <sys/stat.h>
-
-static char folder[] = "/tmp/palpate_shell_scene_XXXXXX";
-
-static const char *in_folder(const char *name)
-{
-    static char path[4][256];
-    static int turn;
-    char *out = path[turn++ & 3];
-    snprintf(out, 256, "%s/%s", folder, name);
-    return out;
-}
-
-static bool write_text(const char *name, const char *text)
-{
-    FILE *file = fopen(in_folder(name), "wb");
-    if (!file) return false;
-    fputs(text, file);
-    return fclose(file) == 0;
-}
 
 /* a box of 12 triangles, 100 x 80 x 60 mm, corners at 0 */
 #define BOX_VERTICES "v 0 0 0\nv 100 0 0\nv 0 80 0\nv 100 80 0\nv 0 0 60\nv 100 0 60\nv 0 80 60\nv 100 80 60\n"
@@ -44,7 +23,7 @@ static pal_loaded_scene *from_text(const char *text, const pal_surface_scene *op
 {
     pal_loaded_scene *loaded = NULL;
     pal_diagnostic diag = {""};
-    if (!write_text("x.obj", text)) return NULL;
+    if (!write_text(in_folder("x.obj"), text)) return NULL;
     if (pal_scene_from_surface(in_folder("x.obj"), options, &loaded, report, &diag)) CHECK_FAIL("%s", diag.text);
     return loaded;
 }
@@ -133,7 +112,7 @@ static void expect_refusal(const char *text, const pal_surface_scene *options, p
 {
     pal_loaded_scene *loaded = NULL;
     pal_diagnostic diag = {""};
-    REQUIRE(write_text("bad.obj", text));
+    REQUIRE(write_text(in_folder("bad.obj"), text));
     pal_err err = pal_scene_from_surface(in_folder("bad.obj"), options, &loaded, NULL, &diag);
     CHECK_INT(err, wanted);
     CHECK(loaded == NULL);
@@ -265,7 +244,7 @@ static void a_sheet_is_held_at_its_border_on_every_level_and_a_sphere_nowhere(vo
 }
 
 /* pressed from the front while it refines */
-static uint64_t hash_after(const pal_scene *scene, int n_step)
+static uint64_t pressed_hash(const pal_scene *scene, int n_step)
 {
     pal_world *world = world_of(scene);
     if (!world) return 0;
@@ -293,12 +272,12 @@ static void a_saved_scene_loads_to_the_same_world(void)
     CHECK_INT(out->scene.body[0].n_support, 2);
     const pal_support_def *a = &in->scene.body[0].support[1], *b = &out->scene.body[0].support[1];
     CHECK(!memcmp(a->low_m, b->low_m, sizeof a->low_m) && !memcmp(a->high_m, b->high_m, sizeof a->high_m));
-    uint64_t hash = hash_after(&in->scene, 40);
+    uint64_t hash = pressed_hash(&in->scene, 40);
     CHECK(hash != 0);
-    CHECK(hash_after(&out->scene, 40) == hash);
+    CHECK(pressed_hash(&out->scene, 40) == hash);
     /* and the hash does depend on what was saved */
     out->scene.body[0].material.young_Pa *= 1.0001;
-    CHECK(hash_after(&out->scene, 40) != hash);
+    CHECK(pressed_hash(&out->scene, 40) != hash);
     pal_scene_free(in);
     pal_scene_free(out);
     in = from_shape("sheet", NULL), out = NULL;
@@ -340,7 +319,7 @@ static void every_key_of_the_model_arrives(void)
                                               "0.3, \"every_s\": 0.02, \"most_node\": 60, \"ramp_s\": 0.1}]");
     pal_loaded_scene *loaded;
     pal_world *world;
-    REQUIRE(write_text("x.obj", tube));
+    REQUIRE(write_text(in_folder("x.obj"), tube));
     CHECK_TEXT(try_text(text, &loaded, &world), "");
     REQUIRE(world != NULL);
     const pal_adaptive_surface *surface = pal_world_body(world, 0)->model.adaptive;
@@ -400,7 +379,7 @@ static void every_bad_key_has_its_sentence(void)
         {"{\"bodies\": [{\"mesh\": \"saved/stomach.palmesh\"}]}",
          "\"tet_springs\" works on tetrahedra, and the mesh is a surface alone"},
     };
-    REQUIRE(write_text("x.obj", tube) && write_text("b.obj", box));
+    REQUIRE(write_text(in_folder("x.obj"), tube) && write_text(in_folder("b.obj"), box));
     for (size_t k = 0; k < sizeof bad / sizeof bad[0]; k++) {
         pal_loaded_scene *loaded;
         pal_world *world;

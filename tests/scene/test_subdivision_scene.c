@@ -2,24 +2,12 @@
  * bits. */
 #include "server/mesh/cells/cell_file.h"
 #include "server/mesh/cells/cell_models.h"
-#include "server/scene/scene_file.h"
 #include "server/sim/subdivision/subdivision_solid.h"
-#include "server/sim/world/world.h"
 #include "tests/fixtures/cell_check.h"
+#include "tests/fixtures/scene_files.h"
 #include "tests/fixtures/solids.h"
 
 #include <sys/stat.h>
-
-static char folder[] = "/tmp/palpate_solid_scene_XXXXXX";
-
-static const char *in_folder(const char *name)
-{
-    static char path[4][256];
-    static int turn;
-    char *out = path[turn++ & 3];
-    snprintf(out, 256, "%s/%s", folder, name);
-    return out;
-}
 
 /* 3 x 2 x 2 bricks of odd sizes, one corner sharp, away from zero */
 static pal_cells bricks(void)
