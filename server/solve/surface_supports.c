@@ -116,7 +116,8 @@ static bool fits(const pal_problem *problem, int support, const pal_prepared *me
     return any && deep < FITS;
 }
 
-/* What lies in the region is left out: of each weight the part that a whole voxel's has there */
+/* What lies in the region is left out: of each weight the part that a whole voxel's has there, which of a cut voxel is
+ * an approximation */
 static void leave_out(maker *m, const double low[3], const double high[3])
 {
     pal_hexes *hexes = &m->mesh->hexes;

@@ -124,7 +124,7 @@ static void cube_of_two_stiffnesses_does_not_lock(void)
 }
 
 /* The free height of the supported teeth is 0.05 m, half a voxel at resolution 20. The third row has the voxels of the
- * second, each split into eight: what remains is the error of the border's octants and of the penalty of its support */
+ * second, each split into eight: what remains is the error of the border's weights and of the penalty of its support */
 static void gear_twists_as_the_reference(void)
 {
     static const row rows[] = {

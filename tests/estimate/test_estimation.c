@@ -299,7 +299,7 @@ static void neighbours_are_what_a_switch_makes(void)
             printf("  %s %d voxels, %g ms: nodes %d foreseen, %g made, sub-steps %d, %d\n", to->model, to->size,
                    1e3 * to->step_s, e.neighbour_nodes[i], nodes, e.neighbour_substeps[i], pal_world_substeps(next));
             bool size = to->size != 9;
-            /* a quarter off from 8 voxels on; of 4 nearly all are cut */
+            /* a quarter off from 8 voxels on; of 4 nearly all are cut (0.27) */
             const double off = size ? (to->size < 8 ? 0.3 : 0.25) * nodes : 0;
             CHECK_NEAR(e.neighbour_nodes[i], nodes, off);
             /* of another size they follow from the voxel's edge alone, and half of the nodes of four voxels are on the

@@ -1,7 +1,8 @@
 /* Prepared meshes from any bytes. The checksum is set right first, so that the checks behind it are reached. What is
- * taken is used: the skin on its tetrahedra, the surface to make levels of. */
+ * taken is used: the skin on its tetrahedra, the surface to make levels of, voxels to make larger ones of. */
 #include "server/mesh/geometry/levels.h"
 #include "server/mesh/volume/prepared.h"
+#include "server/mesh/volume/voxel_coarsening.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -35,6 +36,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
         pal_levels levels;
         const pal_levels_options options = {.n_level = 2, .budget_byte = 16 << 20};
         if (!pal_levels_make(&p.surface, &options, &levels, &diag)) pal_levels_free(&levels);
+        pal_prepared coarse;
+        if (p.hexes.n_hex > 0 && !pal_voxels_coarsen(&p.tets, &p.hexes, (int[3]){0}, 0.1, &coarse, &diag))
+            pal_prepared_free(&coarse);
         pal_prepared_free(&p);
     }
     free(copy);

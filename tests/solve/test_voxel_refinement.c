@@ -29,14 +29,14 @@ static void the_body_stays_and_its_voxels_shrink(void)
         REQUIRE(make_organ(&p));
         int n_hex = p.hexes.n_hex, cubes = split * split * split;
         double h = p.tets.edge_m, volume = filled(&p), low[2] = {INFINITY, INFINITY}, min = 1, share = 1;
-        float *octant = malloc(8 * sizeof *octant * (size_t)n_hex);
+        float *weight = malloc(8 * sizeof *weight * (size_t)n_hex);
         double *corner = malloc(3 * sizeof *corner * (size_t)n_hex);
-        REQUIRE(octant && corner && p.hexes.weight);
-        memcpy(octant, p.hexes.weight, 8 * sizeof *octant * (size_t)n_hex);
+        REQUIRE(weight && corner && p.hexes.weight);
+        memcpy(weight, p.hexes.weight, 8 * sizeof *weight * (size_t)n_hex);
         for (int e = 0; e < n_hex; e++) memcpy(corner + 3 * e, p.tets.x + 3 * p.hexes.node[8 * e], 24);
         for (int i = 0; i < p.tets.n_node; i++) low[0] = fmin(low[0], p.tets.x[3 * i]);
         CHECK_INT(pal_refine_voxels(&p, split, &diag), 0);
-        /* none where nothing is inside, which only the octants of cut voxels know */
+        /* none where nothing is inside, which only the weights of cut voxels know */
         CHECK(p.hexes.n_hex <= n_hex * cubes && p.hexes.n_hex > 0.8 * n_hex * cubes);
         CHECK_INT(p.tets.n_tet, 5 * p.hexes.n_hex);
         CHECK_NEAR(p.tets.edge_m, h / split, 1e-15);
@@ -45,7 +45,7 @@ static void the_body_stays_and_its_voxels_shrink(void)
         CHECK_INT(p.skin.n_vertex, 0);
         for (int i = 0; i < p.tets.n_node; i++) low[1] = fmin(low[1], p.tets.x[3 * i]);
         CHECK_NEAR(low[0], low[1], 1e-12);
-        /* each octant has the density of the octant that its middle lies in */
+        /* each octant has the weight of the coarse octant that its middle lies in */
         for (int e = 0; e < p.hexes.n_hex; e++) {
             int at = -1, worse = 0;
             const double *x = p.tets.x + 3 * p.hexes.node[8 * e];
@@ -61,14 +61,14 @@ static void the_body_stays_and_its_voxels_shrink(void)
                 int in = 0;
                 for (int c = 0; c < 3; c++)
                     in |= (x[c] - corner[3 * at + c] + (q >> c & 1 ? 0.75 : 0.25) * h / split > h / 2) << c;
-                worse += p.hexes.weight[8 * e + q] != octant[8 * at + in];
+                worse += p.hexes.weight[8 * e + q] != weight[8 * at + in];
             }
             if (at < 0 || worse || p.hexes.fill[e] != pal_weight_sum(p.hexes.weight + 8 * e)) share = 0;
             min = fmin(min, (double)p.hexes.fill[e]);
         }
         CHECK_NEAR(share, 1, 0);
         CHECK(min < 0.5); /* there are cut voxels */
-        free(octant);
+        free(weight);
         free(corner);
         pal_prepared_free(&p);
     }

@@ -39,7 +39,7 @@ void pal_hexes_set_weights(pal_hexes *hexes, int e, const double weight[8])
         wanted += weight[q], min_weight = fmin(min_weight, weight[q]), max_weight = fmax(max_weight, weight[q]);
     double low = -max_weight, high = 0.125 - min_weight;
     if (wanted > 1 - WHOLE) low = shift = high;
-    while ((min_weight < 0 || max_weight > 0.125) && high - low > 1e-9) {
+    for (int k = 0; k < 40 && (min_weight < 0 || max_weight > 0.125); k++) {
         double sum = 0;
         shift = (low + high) / 2;
         for (int q = 0; q < 8; q++) sum += fmin(fmax(weight[q] + shift, 0), 0.125);

@@ -90,16 +90,15 @@ static void join_rows(const runs *r, int32_t *parent, int64_t row, int64_t other
     }
 }
 
-static void clear_smaller(pal_bits *bits, const runs *r, int32_t *parent, const int64_t *size)
+/* clears the components whose roots are not kept */
+static void clear_others(pal_bits *bits, const runs *r, int32_t *parent, const bool *keep)
 {
-    int64_t best = 0, n_row = (int64_t)bits->n[1] * bits->n[2];
-    for (int64_t i = 0; i < r->n; i++)
-        if (parent[i] == i && size[i] > size[best]) best = i;
+    const int64_t n_row = (int64_t)bits->n[1] * bits->n[2];
     for (int64_t row = 0; row < n_row; row++)
         for (int64_t i = r->start[row]; i < r->start[row + 1]; i++) {
             uint64_t *word = bits->word + (size_t)bits->n_word * (size_t)row;
             int from = r->item[i].from, to = r->item[i].to;
-            if (pal_union_find_root(parent, (int32_t)i) == best) continue;
+            if (keep[pal_union_find_root(parent, (int32_t)i)]) continue;
             for (int w = from >> 6; w <= (to - 1) >> 6; w++) word[w] &= ~run_mask(w, from, to);
         }
 }
@@ -116,30 +115,66 @@ static pal_err find_runs(const pal_bits *bits, runs *r)
     return r->n < INT32_MAX ? err : PAL_ERR_MEMORY;
 }
 
+/* runs and the components that they form; *parent [number of runs] */
+static pal_err join_runs(const pal_bits *bits, runs *r, int32_t **parent)
+{
+    pal_err err = find_runs(bits, r);
+    PAL_ARRAY(&err, *parent, r->n);
+    if (err) return err;
+    pal_union_find_init(*parent, (int)r->n);
+    int64_t row = 0;
+    for (int z = 0; z < bits->n[2]; z++)
+        for (int y = 0; y < bits->n[1]; y++, row++) {
+            if (y > 0) join_rows(r, *parent, row, row - 1);
+            if (z > 0) join_rows(r, *parent, row, row - bits->n[1]);
+        }
+    return PAL_ERR_OK;
+}
+
 pal_err pal_bits_components(pal_bits *bits, bool largest_only, int *n_component)
 {
     runs r = {0};
-    int32_t *parent;
-    int64_t *size;
-    pal_err err = find_runs(bits, &r);
-    PAL_ARRAY(&err, parent, r.n);
+    int32_t *parent = NULL;
+    int64_t *size, best = 0;
+    bool *keep;
+    pal_err err = join_runs(bits, &r, &parent);
     PAL_ZEROED(&err, size, r.n);
+    PAL_ZEROED(&err, keep, r.n);
     if (!err) {
-        pal_union_find_init(parent, (int)r.n);
-        int64_t row = 0;
-        for (int z = 0; z < bits->n[2]; z++)
-            for (int y = 0; y < bits->n[1]; y++, row++) {
-                if (y > 0) join_rows(&r, parent, row, row - 1);
-                if (z > 0) join_rows(&r, parent, row, row - bits->n[1]);
-            }
         int n = 0;
         for (int64_t i = 0; i < r.n; i++) {
             int32_t root = pal_union_find_root(parent, (int32_t)i);
             n += root == i;
             size[root] += r.item[i].to - r.item[i].from;
         }
-        if (largest_only && n > 1) clear_smaller(bits, &r, parent, size);
+        for (int64_t i = 0; i < r.n; i++)
+            if (size[i] > size[best]) best = i;
+        if (r.n > 0) keep[best] = true;
+        if (largest_only && n > 1) clear_others(bits, &r, parent, keep);
         *n_component = n;
     }
-    return PAL_FREED(err, r.item, r.start, parent, size);
+    return PAL_FREED(err, r.item, r.start, parent, size, keep);
+}
+
+static bool has_bit(const uint64_t *word, int from, int to)
+{
+    for (int w = from >> 6; w <= (to - 1) >> 6; w++)
+        if (word[w] & run_mask(w, from, to)) return true;
+    return false;
+}
+
+pal_err pal_bits_keep_joined(pal_bits *bits, const pal_bits *seeds)
+{
+    runs r = {0};
+    int32_t *parent = NULL;
+    bool *keep;
+    const int64_t n_row = (int64_t)bits->n[1] * bits->n[2];
+    pal_err err = join_runs(bits, &r, &parent);
+    PAL_ZEROED(&err, keep, r.n);
+    for (int64_t row = 0; row < n_row && !err; row++)
+        for (int64_t i = r.start[row]; i < r.start[row + 1]; i++)
+            if (has_bit(seeds->word + (size_t)seeds->n_word * (size_t)row, r.item[i].from, r.item[i].to))
+                keep[pal_union_find_root(parent, (int32_t)i)] = true;
+    if (!err) clear_others(bits, &r, parent, keep);
+    return PAL_FREED(err, r.item, r.start, parent, keep);
 }

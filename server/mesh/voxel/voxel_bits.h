@@ -31,6 +31,8 @@ static inline bool pal_bits_get(const pal_bits *bits, int x, int y, int z)
 int64_t pal_bits_count(const pal_bits *bits);
 /* face-connected components; with largest_only the smaller ones are cleared; MEMORY */
 pal_err pal_bits_components(pal_bits *bits, bool largest_only, int *n_component);
+/* clears the face-connected components in which no bit of seeds is set; MEMORY */
+pal_err pal_bits_keep_joined(pal_bits *bits, const pal_bits *seeds);
 
 /* corners of the five tetrahedra of a voxel, by the parity of its index; corner bits x = 1, y = 2, z = 4 */
 extern const uint8_t pal_voxel_tets[2][5][4];

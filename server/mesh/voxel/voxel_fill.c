@@ -1,7 +1,8 @@
-/* From a surface to voxels (paper B section 2.2): inside, one border layer, components.
+/* From a surface to voxels (paper B section 2.2): inside, border, components.
  *
  * The grid begins one voxel outside the corner of the box of the surface, so the first centre lies half a voxel inside
- * it. Inside voxels are bits, so that the border layer is a shift and two neighbouring rows. */
+ * it. Inside voxels are bits, so that their face neighbours are a shift and
+ * two neighbouring rows. */
 #include "server/mesh/voxel/voxels.h"
 
 #include "server/base/clock.h"
@@ -114,44 +115,49 @@ static void take_layer(void *self, int z, const double *fraction)
     }
 }
 
-/* The border: filled voxels that faces join to the inside, some through others, as at an edge of the body. *n_dropped:
- * of face neighbours that are not filled */
-static pal_err grow_border(const pal_bits *inside, const pal_bits *filled, pal_bits *border, int64_t *n_dropped)
+/* What is left out of the filled voxels: voxels inside other components, and those around them that touch no voxel of
+ * this one */
+static pal_err leave_out(const pal_bits *others, const pal_bits *border, pal_bits *filled)
 {
+    pal_bits around;
+    PAL_TRY(pal_bits_create(others->n, &around));
+    find_border(others, &around);
+    for (size_t i = 0; i < pal_bits_words(filled); i++)
+        filled->word[i] &= ~(others->word[i] | (around.word[i] & ~border->word[i]));
+    pal_bits_free(&around);
+    return PAL_ERR_OK;
+}
+
+/* In place of the face neighbours of the inside: all voxels of which min lies inside and that faces join to it, some
+ * through others, as at an edge of the body. others: voxels inside components that are left out, word NULL: none */
+static pal_err keep_filled(const pal_surface *surface, const pal_bits *inside, const pal_bits *others, double min,
+                           const pal_voxels *grid, pal_bits *border, int64_t *n_dropped, pal_diagnostic *diag)
+{
+    filled_voxels filled = {.min = min};
+    PAL_TRY(pal_bits_create(inside->n, &filled.bits));
     const size_t n_word = pal_bits_words(inside);
-    pal_bits kept, next;
-    int64_t n_before = -1, n_next = 0;
-    PAL_TRY(pal_bits_create(inside->n, &kept));
-    pal_err err = pal_bits_create(inside->n, &next);
-    while (!err && n_next > n_before) {
-        n_before = n_next;
-        for (size_t i = 0; i < n_word; i++) kept.word[i] = inside->word[i] | border->word[i], next.word[i] = 0;
-        find_border(&kept, &next);
-        *n_dropped = pal_bits_count(&next);
-        for (size_t i = 0; i < n_word; i++) border->word[i] |= next.word[i] & filled->word[i];
-        n_next = pal_bits_count(border);
-        *n_dropped -= n_next - n_before;
-    }
-    pal_bits_free(&kept), pal_bits_free(&next);
+    uint64_t *kept = filled.bits.word;
+    pal_err err = pal_voxels_fraction(surface, grid, false, take_layer, &filled, diag);
+    for (size_t i = 0; i < n_word; i++) *n_dropped += __builtin_popcountll(border->word[i] & ~kept[i]);
+    if (!err && others->word) err = leave_out(others, border, &filled.bits);
+    for (size_t i = 0; i < n_word; i++) kept[i] |= inside->word[i];
+    if (!err) err = pal_bits_keep_joined(&filled.bits, inside);
+    for (size_t i = 0; i < n_word; i++) border->word[i] = kept[i] & ~inside->word[i];
+    pal_bits_free(&filled.bits);
     return err;
 }
 
 /* border, dropped border voxels, components, counts, budget, bytes */
-static pal_err keep_voxels(const pal_surface *surface, const pal_bits *inside, const pal_voxel_options *options,
-                           pal_voxels *voxels, pal_voxel_report *report, pal_diagnostic *diag)
+static pal_err keep_voxels(const pal_surface *surface, const pal_bits *inside, const pal_bits *others,
+                           const pal_voxel_options *options, pal_voxels *voxels, pal_voxel_report *report,
+                           pal_diagnostic *diag)
 {
     pal_bits border;
     pal_err err = PAL_ERR_OK;
     PAL_TRY(pal_bits_create(inside->n, &border));
-    if (options->border && options->min_fill > 0) {
-        filled_voxels filled = {.min = options->min_fill};
-        err = pal_bits_create(inside->n, &filled.bits);
-        if (!err) err = pal_voxels_fraction(surface, voxels, false, take_layer, &filled, diag);
-        if (!err) err = grow_border(inside, &filled.bits, &border, &report->n_dropped);
-        pal_bits_free(&filled.bits);
-    } else if (options->border) {
-        find_border(inside, &border);
-    }
+    if (options->border) find_border(inside, &border);
+    if (options->border && options->min_fill > 0)
+        err = keep_filled(surface, inside, others, options->min_fill, voxels, &border, &report->n_dropped, diag);
     /* components of all kept voxels */
     for (size_t i = 0; i < pal_bits_words(inside); i++) border.word[i] |= inside->word[i];
     if (!err) err = pal_bits_components(&border, false, &report->n_component);
@@ -169,20 +175,30 @@ static pal_err keep_voxels(const pal_surface *surface, const pal_bits *inside, c
     return err;
 }
 
+/* others: the voxels that were inside and are so no more */
+static pal_err keep_largest(pal_bits *inside, pal_bits *others)
+{
+    int n;
+    PAL_TRY(pal_bits_create(inside->n, others));
+    memcpy(others->word, inside->word, pal_bits_words(inside) * sizeof *inside->word);
+    PAL_TRY(pal_bits_components(inside, true, &n));
+    for (size_t i = 0; i < pal_bits_words(inside); i++) others->word[i] &= ~inside->word[i];
+    return PAL_ERR_OK;
+}
+
 pal_err pal_voxels_fill(const pal_surface *surface, const pal_voxel_options *options, pal_voxels *out,
                         pal_voxel_report *report, pal_diagnostic *diag)
 {
     double began = pal_clock_s();
     pal_voxels voxels = {0};
     pal_voxel_report measured = {0};
-    pal_bits inside = {0};
+    pal_bits inside = {0}, others = {0};
     PAL_TRY(make_grid(surface, options, &voxels, diag));
     pal_err err = pal_bits_create(voxels.n, &inside);
     if (!err) err = pal_voxels_classify(surface, options, &voxels, &inside, &measured, diag);
-    int n_before;
-    if (!err && options->largest_only) err = pal_bits_components(&inside, true, &n_before);
-    if (!err) err = keep_voxels(surface, &inside, options, &voxels, &measured, diag);
-    pal_bits_free(&inside);
+    if (!err && options->largest_only) err = keep_largest(&inside, &others);
+    if (!err) err = keep_voxels(surface, &inside, &others, options, &voxels, &measured, diag);
+    pal_bits_free(&inside), pal_bits_free(&others);
     if (err == PAL_ERR_MEMORY)
         pal_diagnostic_set(diag, err, "out of memory for %d x %d x %d voxels", voxels.n[0], voxels.n[1], voxels.n[2]);
     if (err) return err;

@@ -268,39 +268,57 @@ static pal_err find_plain(const pal_scan_surface *scan, const pal_voxels *grid, 
     return err;
 }
 
-/* sums of the set samples of one voxel: their share, or the integrals of the Gauss points' shape functions */
-static void add_samples(const pal_bits *sample, const int at[3], int n_sub, bool weights, double *to)
+static int count_samples(const pal_bits *sample, const int at[3], int n_sub)
 {
-    const int n = n_sub * n_sub * n_sub;
     int count = 0;
-    double shape[2][SUBSAMPLES], sum[8] = {0};
-    for (int i = 0; i < n; i++)
-        count += pal_bits_get(sample, n_sub * at[0] + i % n_sub, n_sub * at[1] + i / n_sub % n_sub,
-                              n_sub * at[2] + i / n_sub / n_sub);
-    if (!weights) {
-        *to = (double)count / n;
-        return;
+    for (int z = 0; z < n_sub; z++)
+        for (int y = 0; y < n_sub; y++)
+            for (int x = 0; x < n_sub; x++)
+                count += pal_bits_get(sample, n_sub * at[0] + x, n_sub * at[1] + y, n_sub * at[2] + z);
+    return count;
+}
+
+/* of the set samples of one voxel, the integrals of the Gauss points' shape functions; shape: at the samples along an
+ * axis */
+static void weigh_samples(const pal_bits *sample, const int at[3], int n_sub, double shape[2][SUBSAMPLES], double to[8])
+{
+    const double part = 1.0 / ((double)n_sub * n_sub * n_sub);
+    for (int z = 0; z < n_sub; z++)
+        for (int y = 0; y < n_sub; y++)
+            for (int x = 0; x < n_sub; x++) {
+                if (!pal_bits_get(sample, n_sub * at[0] + x, n_sub * at[1] + y, n_sub * at[2] + z)) continue;
+                for (int q = 0; q < 8; q++) to[q] += part * shape[q & 1][x] * shape[q >> 1 & 1][y] * shape[q >> 2][z];
+            }
+}
+
+/* fractions or weights of a layer of voxels */
+static void close_sampled_layer(const pal_bits *sample, const int n[3], int z, int n_sub, bool weights, double *layer)
+{
+    double shape[2][SUBSAMPLES];
+    const int all = n_sub * n_sub * n_sub;
+    for (int i = 0; i < n_sub; i++)
+        for (int side = 0; side < 2; side++)
+            shape[side][i] = (1 + (side ? sqrt(3) : -sqrt(3)) * ((2 * i + 1.0) / n_sub - 1)) / 2;
+    for (int i = 0; i < n[0] * n[1]; i++) {
+        const int at[3] = {i % n[0], i / n[0], z}, count = count_samples(sample, at, n_sub);
+        double *to = layer + (size_t)i * (weights ? 8 : 1);
+        if (!weights) to[0] = (double)count / all;
+        for (int q = 0; q < 8 && weights; q++) to[q] = count == all ? 0.125 : 0;
+        if (weights && count > 0 && count < all) weigh_samples(sample, at, n_sub, shape, to);
     }
-    for (int i = 0; i < 2 * n_sub; i++)
-        shape[i % 2][i / 2] = (1 + (i % 2 ? 1 : -1) * sqrt(3) * ((i / 2 * 2 + 1.0) / n_sub - 1)) / 2;
-    for (int i = 0; i < n && count > 0 && count < n; i++) {
-        const int p[3] = {i % n_sub, i / n_sub % n_sub, i / n_sub / n_sub};
-        if (!pal_bits_get(sample, n_sub * at[0] + p[0], n_sub * at[1] + p[1], n_sub * at[2] + p[2])) continue;
-        for (int q = 0; q < 8; q++) sum[q] += shape[q & 1][p[0]] * shape[q >> 1 & 1][p[1]] * shape[q >> 2][p[2]];
-    }
-    for (int q = 0; q < 8; q++) to[q] = count == n ? 0.125 : sum[q] / n;
 }
 
 /* a grid on which the surface is refused (a sheet that encloses few samples) is replaced by a coarser one */
 static pal_err fractions_by_samples(const pal_surface *surface, const pal_voxels *grid, bool weights,
                                     pal_fraction_layer take, void *self, pal_diagnostic *diag)
 {
-    const int *n = grid->n, n_sum = weights ? 8 : 1;
+    const int *n = grid->n;
     double n_cell = (double)n[0] * n[1] * n[2];
     int n_sub = SUBSAMPLES, longest = n[0] > n[1] ? n[0] : n[1];
     longest = n[2] > longest ? n[2] : longest;
-    while (n_sub > 1 && (n_sub * longest > MAX_SAMPLE_AXIS || n_cell * pow(n_sub, 3) > MAX_SAMPLE)) n_sub--;
-    double *layer = malloc((size_t)n[0] * (size_t)n[1] * (size_t)n_sum * sizeof *layer);
+    while (n_sub > (weights ? 2 : 1) && (n_sub * longest > MAX_SAMPLE_AXIS || n_cell * pow(n_sub, 3) > MAX_SAMPLE))
+        n_sub--;
+    double *layer = malloc((size_t)n[0] * (size_t)n[1] * (weights ? 8 : 1) * sizeof *layer);
     pal_err err = layer ? PAL_ERR_REFUSED : PAL_ERR_MEMORY;
     for (; err == PAL_ERR_REFUSED && n_sub > 0; n_sub--) {
         pal_voxel_options options = {.resolution = n_sub * longest};
@@ -312,9 +330,7 @@ static pal_err fractions_by_samples(const pal_surface *surface, const pal_voxels
         if (err) break;
         err = pal_voxels_classify(surface, &options, &fine, &sample, &report, diag);
         for (int z = 0; !err && z < n[2]; z++) {
-            for (int i = 0; i < n[0] * n[1]; i++)
-                add_samples(&sample, (const int[3]){i % n[0], i / n[0], z}, n_sub, weights,
-                            layer + (size_t)i * (size_t)n_sum);
+            close_sampled_layer(&sample, n, z, n_sub, weights, layer);
             take(self, z, layer);
         }
         pal_bits_free(&sample);

@@ -1,5 +1,5 @@
-/* From a surface to voxels and tetrahedra (paper B section 2.2): the voxels whose centres lie inside, one layer of
- * border voxels outside, five tetrahedra per voxel with mirrored parity. server/mesh/README.md gives the theory and the
+/* From a surface to voxels and tetrahedra (paper B section 2.2): the voxels whose centres lie inside, border voxels
+ * around them, five tetrahedra per voxel with mirrored parity. server/mesh/README.md gives the theory and the
  * departures from the paper.
  *
  * A refusal for want of a volume carries a number: reason 1, the surface has no extent; reason 2, it is closed but no
@@ -19,11 +19,13 @@ typedef enum pal_voxel_method {
 } pal_voxel_method;
 
 typedef struct pal_voxel_options {
-    int resolution;    /* voxels on the longest axis, 1..1024                                            */
-    bool border;       /* keep the one layer of border voxels outside (paper B); false: inside only      */
+    int resolution; /* voxels on the longest axis, 1..1024                                            */
+    bool border; /* keep the face neighbours of inside voxels (paper B) or, with min_fill, what is filled; false: inside
+                    only */
     bool largest_only; /* keep only the largest face-connected component of inside voxels, and its border */
     int64_t max_voxel; /* BUDGET beyond this many kept voxels; 0: 50 million                             */
-    double min_fill;   /* border voxels with a smaller fraction inside the surface are dropped; 0: none       */
+    double min_fill;   /* border voxels are those of which at least this fraction lies inside the surface and that faces
+                          join to inside voxels, some through others; 0: all face neighbours */
     bool fill;         /* pal_prepared_make only: measure the fill of every voxel (min_fill > 0 does so too)  */
     double ahead[3];   /* 0..1 per axis: the grid begins this fraction of a voxel before the box of the surface, so that
                           its planes pass through a chosen place (the border of a support); 0: at the box */
@@ -43,7 +45,7 @@ typedef struct pal_voxel_report {
     char method[16];          /* how inside was decided: "scanline" | "vote" | "winding" */
     int n_component;          /* face-connected components of the kept voxels, the border included */
     int64_t n_disagree;       /* voxels that no two axes settle unopposed */
-    int64_t n_dropped;        /* border voxels that min_fill dropped                          */
+    int64_t n_dropped;        /* face neighbours of inside voxels that min_fill dropped       */
     bool open;                /* some edge has an odd number of triangles                           */
     double surface_volume_m3; /* by the divergence theorem, cavities subtracted, holes closed by fans     */
     double inside_volume_m3;  /* inside voxels                                                     */

@@ -66,6 +66,42 @@ static void planes_lie_where_requested(void)
     }
 }
 
+/* Eight voxels of a quarter space, x below 0.55 and y below 0.5 of the large voxel: the large one's weights are those
+ * of its own moments, a product of (f -+ sqrt 3 f (f - 1)) / 2 along x and y and 1/2 along z */
+static void a_large_voxel_has_the_weights_of_its_own_moments(void)
+{
+    static const double share[3] = {0.55, 0.5, 1};
+    pal_tets tets = {0};
+    pal_hexes hexes = {0};
+    pal_prepared out = {0};
+    REQUIRE(make((int[3]){2, 2, 2}, &tets, &hexes));
+    hexes.weight = calloc(64, sizeof *hexes.weight);
+    REQUIRE(hexes.weight);
+    for (int e = 0; e < 8; e++) {
+        const double *x = tets.x + 3 * hexes.node[8 * e], low[3] = {-1, 2, 0.25};
+        for (int q = 0; q < 8; q++) {
+            double weight = 1;
+            for (int c = 0; c < 3; c++) {
+                const double f = fmin(fmax(2 * share[c] - (x[c] - low[c] > 0.25), 0), 1);
+                weight *= (f + (q >> c & 1 ? sqrt(3) : -sqrt(3)) * f * (f - 1)) / 2;
+            }
+            hexes.weight[8 * e + q] = (float)weight; /* as integrated, however small */
+        }
+        hexes.fill[e] = pal_weight_sum(hexes.weight + 8 * e);
+    }
+    REQUIRE(!pal_voxels_coarsen(&tets, &hexes, (int[3]){0, 0, 0}, 0, &out, NULL));
+    CHECK_INT(out.hexes.n_hex, 1);
+    for (int q = 0; q < 8; q++) {
+        double weight = 1;
+        for (int c = 0; c < 3; c++)
+            weight *= (share[c] + (q >> c & 1 ? sqrt(3) : -sqrt(3)) * share[c] * (share[c] - 1)) / 2;
+        CHECK_NEAR((double)out.hexes.weight[q], weight, 1e-5);
+    }
+    pal_prepared_free(&out);
+    pal_tets_free(&tets);
+    pal_hexes_free(&hexes);
+}
+
 static void volume_is_kept_or_little_of_it_dropped(void)
 {
     pal_tets tets = {0};
@@ -110,6 +146,7 @@ int main(void)
 {
     RUN(a_box_of_even_sides_is_a_box_of_half_as_many);
     RUN(planes_lie_where_requested);
+    RUN(a_large_voxel_has_the_weights_of_its_own_moments);
     RUN(volume_is_kept_or_little_of_it_dropped);
     RUN(without_voxels_it_is_refused);
     return check_report();

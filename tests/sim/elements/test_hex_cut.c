@@ -25,10 +25,10 @@ static void begin(hex_body *b, int nx, int ny, int nz, const char *element, cons
 /* weights of the points over those of a whole voxel; returns their sum over 8 */
 static double weights(const hex_body *b, int e, double weight[8])
 {
-    double sum = 0, octant[8];
-    pal_hexes_weights(&b->hexes, e, PAL_FILL_MIN, octant);
+    double sum = 0, inside[8];
+    pal_hexes_weights(&b->hexes, e, PAL_FILL_MIN, inside);
     for (int q = 0; q < 8; q++) {
-        weight[q] = (1 - PAL_VOID_STIFFNESS) * octant[q] + PAL_VOID_STIFFNESS / 8;
+        weight[q] = (1 - PAL_VOID_STIFFNESS) * inside[q] + PAL_VOID_STIFFNESS / 8;
         sum += weight[q];
     }
     return sum;
