@@ -1,5 +1,5 @@
 /* `palpate bench adaptive`: surfaces whose level of detail follows the deformation (model adaptive_springs), on one
- * core, in processor time; medians of several rounds, ratios within a round.
+ * core, in processor time unless stated; medians of several rounds, ratios within a round.
  *
  * (a) Paper C, Table I: a sphere of 114 and a stomach of 188 vertices, our own and, where they exist, those of
  * ../shared (PAL_SHARED names another folder), coarse, fully refined (450, 746) and adaptive, pressed at one place for
@@ -12,6 +12,8 @@
  * under the palm alone, against refined everywhere.
  * (c) The same with a finest level of 114,690 vertices, at most 2,000 of them active, in steps of 1 ms.
  * (d) There, the cost of one switch: a face split or joined, and the additional time of the step after it.
+ * (e) How many times as fast a step of 1/120 s is with two threads as with one, by the clock, in worlds that step in
+ * turn: the sphere and our stomach, fully refined, pressed.
  *
  * The press is distributed over the nodes of a patch by mass and a smooth bump: the same pressure on every level. */
 #include "server/bench/bench.h"
@@ -29,6 +31,7 @@
 #include <string.h>
 #include <unistd.h>
 
+enum { THREADS_STEPS = 41, N_SIZE = 6 };
 enum { TABLE_STEPS = 138, ROUNDS = 21, PALM_ROUNDS = 3, KINDS = 3, SWITCHES = 61, MAX_NODE = 2000, COMPONENTS = 12 };
 enum { COARSE, REFINED, ADAPTIVE };
 static const char *const kind_name[KINDS] = {"coarse", "refined", "adaptive"};
@@ -43,6 +46,7 @@ typedef struct pressed {
     int axis;                 /* the vertex that is farthest along it is pressed against it */
     double radius_m, force_N; /* of the patch around that                                   */
     double mass_kg;           /* 0: of the wall alone                                       */
+    int threads;
     double at[3];
 } pressed;
 
@@ -70,7 +74,7 @@ static pal_err take(const char *name, const char *path, int axis, pressed *out, 
 {
     const pal_surface_scene options = {
         .label = -1, .adaptive = true, .shape = name, .material = {5000, 0.45, 1000, 4, 1}};
-    *out = (pressed){.name = name, .axis = axis, .source = "procedural"};
+    *out = (pressed){.name = name, .axis = axis, .source = "procedural", .threads = 1};
     if (path) {
         snprintf(out->source, sizeof out->source, "%s", strrchr(path, '/') + 1);
         PAL_TRY(pal_scene_from_surface(path, &options, &out->loaded, NULL, diag));
@@ -95,6 +99,7 @@ static pal_err start(const pressed *p, int kind, int n_level, int max_node, doub
     pal_body_def *def = &scene->body[0];
     scene->n_tool = 0;
     scene->step_s = step_s;
+    scene->threads = p->threads;
     def->n_effect = 0;
     pal_config_entry *model = &def->model;
     pal_entry_init(model, "model", "adaptive_springs");
@@ -428,6 +433,60 @@ static pal_err measure_live(pal_world *world, const pressed *p, pal_table *r, pa
     return PAL_ERR_OK;
 }
 
+/* ---- (e) ---- */
+
+static pal_err compare_threads(pal_world *const world[2], double ms[2], double *faster)
+{
+    double sample[3][THREADS_STEPS];
+    for (int step = -3; step < THREADS_STEPS; step++) {
+        double now_ms[2];
+        for (int k = 0; k < 2; k++) {
+            pal_world_wake(world[k]);
+            const uint64_t began = pal_clock_ns();
+            PAL_TRY(pal_world_step(world[k], 1.0 / 120));
+            now_ms[k] = 1e-6 * (double)(pal_clock_ns() - began);
+        }
+        for (int k = 0; k < 2 && step >= 0; k++) sample[k][step] = now_ms[k];
+        if (step >= 0) sample[2][step] = now_ms[0] / now_ms[1];
+    }
+    for (int k = 0; k < 2; k++) ms[k] = pal_median(sample[k], THREADS_STEPS);
+    *faster = pal_median(sample[2], THREADS_STEPS);
+    return PAL_ERR_OK;
+}
+
+static pal_err run_threads(pal_table *r, pal_diagnostic *diag)
+{
+    static const struct {
+        const char *shape;
+        int n_level;
+    } size[N_SIZE] = {{"stomach", 2}, {"sphere", 3}, {"stomach", 3}, {"sphere", 4}, {"stomach", 4}, {"sphere", 5}};
+    pal_table_note(r, "\nfully refined, steps of 1/120 s, one thread and two in turn");
+    pal_table_list(r, "threads");
+    pal_err err = PAL_ERR_OK;
+    for (int k = 0; k < N_SIZE && !err; k++) {
+        pressed body;
+        pal_world *world[2] = {NULL, NULL};
+        double ms[2], faster;
+        err = take(size[k].shape, NULL, 2, &body, diag);
+        body.radius_m = 0.03, body.force_N = 0.05;
+        for (int w = 0; w < 2 && !err; w++) {
+            body.threads = w + 1;
+            err = start(&body, REFINED, size[k].n_level, 0, 1.0 / 120, &world[w], diag);
+            if (!err) load(world[w], &body, 1);
+        }
+        if (!err) err = compare_threads(world, ms, &faster);
+        if (!err)
+            TABLE_ROW(r, TEXT("body", "body", -8, body.name),
+                      NUMBER("nodes", "nodes", 7, 0, pal_world_body(world[0], 0)->n_active),
+                      NUMBER("substeps", "sub-steps", 9, 0, pal_world_substeps(world[0])),
+                      NUMBER("one_ms", "ms on one", 9, 3, ms[0]), NUMBER("two_ms", "on two", 8, 3, ms[1]),
+                      NUMBER("faster", "times as fast", 13, 2, faster));
+        for (int w = 0; w < 2; w++) pal_world_destroy(world[w]);
+        pal_scene_free(body.loaded);
+    }
+    return err;
+}
+
 pal_err bench_adaptive(pal_table *r, pal_diagnostic *diag)
 {
     static run drawn[2][KINDS];
@@ -451,5 +510,5 @@ pal_err bench_adaptive(pal_table *r, pal_diagnostic *diag)
     if (!err) err = measure_live(world, &ball[1], r, diag);
     pal_world_destroy(world);
     for (int k = 0; k < 2; k++) pal_scene_free(ball[k].loaded);
-    return err;
+    return err ? err : run_threads(r, diag);
 }

@@ -77,6 +77,10 @@ enum { PAL_SPRING_GRID_NODES_MAX = 1 << 20 };
  * (`palpate bench springs`: two threads take 0.9 of the time of one from 1,700 nodes on, 1.1 at 800;
  * tests/replay/test_golden.c has a body with more) */
 enum { PAL_PART_NODES = 750 };
+/* active nodes of an adaptive surface for each of its threads: with fewer, waiting for each other costs what they save
+ * (`palpate bench adaptive`: two threads take the time of one at 746 nodes, 0.8 of it at 1,794;
+ * tests/replay/test_golden.c has a surface with more) */
+enum { PAL_PART_ACTIVE = 500 };
 /* elements of a subdivision solid that threads share: with fewer, their waits cost what they save (`palpate bench
  * solids`: two threads take 1.07 of the time of one for 312 elements, 0.67 for 512; tests/replay/test_golden.c has 512)
  */

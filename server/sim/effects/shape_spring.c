@@ -13,6 +13,7 @@
  *
  * Keys: k_N_m (0.3 k_0, k_0 the model's spring constant), c_Ns_m (0.6 sqrt(k' m_0): damping ratio 0.3), frame (the
  * model's). Constants that are not given follow a live material edit. */
+#include "server/base/team.h"
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/surface/active_nodes.h"
@@ -61,7 +62,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     anchors->world = world;
     anchors->frame.quat[0] = 1;
-    PAL_TRY(pal_active_nodes_make(build->body, build->body_arena ? build->body_arena : build->arena));
+    PAL_TRY(pal_active_nodes_make(build));
     *self = anchors;
     return PAL_ERR_OK;
 }
@@ -87,7 +88,7 @@ static hold find_hold(const shape_spring *anchors, const pal_body *body, pal_rig
     if (anchors->world) return h;
     double at[3];
     if (packed)
-        pal_adaptive_fit_rigid_active(body->model.adaptive, body->active_nodes, frame);
+        pal_adaptive_fit_rigid_active(body->model.adaptive, body, frame);
     else
         pal_adaptive_fit_rigid(body->model.adaptive, body, frame);
     memcpy(h.R, frame->R, sizeof h.R);
@@ -107,28 +108,50 @@ static inline void strain(const hold *h, const double x[3], const double rest[3]
     pal_sub3(out, x, at);
 }
 
-static pal_err compute_forces(void *self, pal_step *step)
+typedef struct force_pass {
+    const pal_body *body;
+    const hold *h;
+    int n_part;
+} force_pass;
+
+static void hold_in_world(void *user, int worker, int part)
 {
-    shape_spring *anchors = self;
-    const pal_body *body = step->body;
-    pal_active_nodes *pack = body->active_nodes;
-    const hold h = find_hold(anchors, body, &anchors->frame, true);
-    if (anchors->world) {
-        for (int k = 0; k < body->n_active; k++) {
-            pal_quad rest = pack->rest[k], x = pal_v8_low(pack->xv[k]), v = pal_v8_high(pack->xv[k]);
-            const double m = rest[3];
-            rest[3] = 0;
-            pack->f[k] -= m * h.k * (x - rest) + m * h.c * v;
-        }
-        return PAL_ERR_OK;
+    const force_pass *p = user;
+    const pal_active_nodes *pack = p->body->active_nodes;
+    const int end = pal_active_first(p->body, p->n_part, part + 1);
+    const double k_1_s2 = p->h->k, c_1_s = p->h->c;
+    (void)worker;
+    for (int k = pal_active_first(p->body, p->n_part, part); k < end; k++) {
+        pal_quad rest = pack->rest[k], x = pal_v8_low(pack->xv[k]), v = pal_v8_high(pack->xv[k]);
+        const double m = rest[3];
+        rest[3] = 0;
+        pack->f[k] -= m * k_1_s2 * (x - rest) + m * c_1_s * v;
     }
-    for (int k = 0; k < body->n_active; k++) {
+}
+
+static void hold_in_frame(void *user, int worker, int part)
+{
+    const force_pass *p = user;
+    const pal_active_nodes *pack = p->body->active_nodes;
+    const int end = pal_active_first(p->body, p->n_part, part + 1);
+    const hold h = *p->h;
+    (void)worker;
+    for (int k = pal_active_first(p->body, p->n_part, part); k < end; k++) {
         const double *x = (const double *)&pack->xv[k], *v = x + 4, *rest = (const double *)&pack->rest[k];
         double *f = (double *)&pack->f[k], u[3], rotation[3];
         strain(&h, x, rest, u);
         pal_cross3(rotation, h.Omega, x);
         for (int c = 0; c < 3; c++) f[c] -= rest[3] * (h.k * u[c] + h.c * (v[c] - h.V[c] - rotation[c]));
     }
+}
+
+static pal_err compute_forces(void *self, pal_step *step)
+{
+    shape_spring *anchors = self;
+    const pal_body *body = step->body;
+    const hold h = find_hold(anchors, body, &anchors->frame, true);
+    force_pass p = {.body = body, .h = &h, .n_part = pal_active_parts(body)};
+    pal_team_run(body->team, p.n_part, anchors->world ? hold_in_world : hold_in_frame, &p);
     return PAL_ERR_OK;
 }
 

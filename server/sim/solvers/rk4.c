@@ -17,8 +17,11 @@
  * for every r, is stable for all r where the classical one is stable without drag, and creeps as v = f/(m r) for
  * very large r. Fixed nodes do not move; prescribed ones keep their velocity. step_guard.h limits displacements.
  * Where the world cannot afford the sub-steps (step->adds_mass), nodes that break the limit get the mass that meets it.
- * Components check for inverted elements whenever the bounds are computed, and in every step while there are any. */
+ * Components check for inverted elements whenever the bounds are computed, and in every step while there are any.
+ *
+ * Threads share the stages of a body with packed dofs in parts of its nodes (active_nodes.h). */
 #include "server/base/clock.h"
+#include "server/base/team.h"
 #include "server/base/vec3.h"
 #include "server/num/lanczos.h"
 #include "server/sim/core/effect_list.h"
@@ -77,35 +80,76 @@ enum { PAUSE = 12, LANCZOS = 10 };
 
 /* ---- forces ---- */
 
-/* the body's state and its loads */
-static void load_state(rk4 *solver, const pal_step *step)
+/* what a part of the nodes has come to in a sub-step */
+typedef struct part_result {
+    double max2;            /* square of the largest displacement, m^2; NaN where one is not finite         */
+    uint64_t n_clamped, ns; /* nodes whose move was shortened, and the time that took */
+} part_result;
+
+/* what threads do with the nodes, part by part */
+typedef struct pass {
+    rk4 *solver;
+    pal_body *body;
+    void (*run)(struct pass *pass, int first, int end, part_result *out);
+    int n_part;
+    const rates *rates;
+    double max_m; /* largest displacement of a node in a sub-step */
+    bool adds_mass, stores_forces;
+    const double *from; /* vectors of Lanczos' iteration [n_active][3] */
+    double *to, small, per;
+    part_result result[PAL_TEAM_MAX];
+} pass;
+
+static void run_part(void *user, int worker, int part)
 {
-    const pal_body *body = step->body;
-    pal_active_nodes_load(body);
-    solver->packed = pal_active_nodes_complete(step);
-    for (int k = 0; k < body->n_active && solver->packed; k++)
-        solver->load[k] = pal_quad_load(body->load + 3 * (size_t)pal_body_point(body, k));
+    pass *p = user;
+    (void)worker;
+    p->run(p, pal_active_first(p->body, p->n_part, part), pal_active_first(p->body, p->n_part, part + 1),
+           &p->result[part]);
+}
+
+static void share(pass *p, void (*run)(pass *p, int first, int end, part_result *out))
+{
+    p->run = run;
+    pal_team_run(p->body->team, p->n_part, run_part, p);
+}
+
+static void begin_pass(pass *p, rk4 *solver, pal_body *body)
+{
+    p->solver = solver, p->body = body, p->n_part = pal_active_parts(body);
+}
+
+/* the body's state and its loads, as which packed forces begin */
+static void load_part(pass *p, int first, int end, part_result *out)
+{
+    const pal_body *body = p->body;
+    (void)out;
+    for (int k = first; k < end; k++) {
+        pal_active_node_load(body, k);
+        body->active_nodes->f[k] = p->solver->load[k] = pal_quad_load(body->load + 3 * (size_t)pal_body_point(body, k));
+    }
 }
 
 /* copies positions and velocities of active_nodes to the body */
-static void store_motion(const pal_body *body)
+static void store_part(pass *p, int first, int end, part_result *out)
 {
-    for (int k = 0; k < body->n_active; k++) {
+    const pal_body *body = p->body;
+    const pal_active_nodes *nodes = body->active_nodes;
+    (void)out;
+    for (int k = first; k < end; k++) {
         size_t i = 3 * (size_t)pal_body_point(body, k);
-        pal_quad_store(body->x + i, pal_v8_low(body->active_nodes->xv[k]));
-        pal_quad_store(body->v + i, pal_v8_high(body->active_nodes->xv[k]));
+        pal_quad_store(body->x + i, pal_v8_low(nodes->xv[k]));
+        pal_quad_store(body->v + i, pal_v8_high(nodes->xv[k]));
+        if (p->stores_forces) pal_quad_store(body->f + i, nodes->f[k]);
     }
 }
 
-/* forces at the positions and velocities of active_nodes, into active_nodes */
-static pal_err find_forces(const rk4 *solver, pal_step *step)
+/* forces at the positions and velocities of active_nodes, into active_nodes, where packed ones begin as the loads */
+static pal_err find_forces(pass *p, pal_step *step)
 {
-    pal_body *body = step->body;
-    if (solver->packed) {
-        memcpy(body->active_nodes->f, solver->load, sizeof *solver->load * (size_t)body->n_active);
-        return pal_run_forces(step, PAL_FORCES_PACKED);
-    }
-    store_motion(body);
+    pal_body *body = p->body;
+    if (p->solver->packed) return pal_run_forces(step, PAL_FORCES_PACKED);
+    share(p, store_part);
     PAL_TRY(pal_assemble_forces(step));
     for (int k = 0; k < body->n_active; k++)
         body->active_nodes->f[k] = pal_quad_load(body->g + 3 * (size_t)pal_body_point(body, k));
@@ -151,24 +195,42 @@ static double one_if_finite(const rk4 *solver, const pal_body *body)
 
 /* ---- the Lanczos bound; vectors are displacements of active nodes [n_active][3] ---- */
 
+/* positions displaced by small v, at rest */
+static void displace_part(pass *p, int first, int end, part_result *out)
+{
+    const rk4 *solver = p->solver;
+    pal_active_nodes *nodes = p->body->active_nodes;
+    (void)out;
+    for (int k = first; k < end; k++) {
+        pal_quad move = p->small * pal_quad_load(p->from + 3 * (size_t)k);
+        nodes->xv[k] = pal_v8_join(pal_v8_low(solver->memory[k].from) + move, (pal_quad){0});
+        nodes->f[k] = solver->load[k];
+    }
+}
+
 /* out = K v by the difference of forces over a small displacement */
+static void subtract_part(pass *p, int first, int end, part_result *out)
+{
+    const pal_body *body = p->body;
+    (void)out;
+    for (int k = first; k < end; k++) {
+        double free = body->support[pal_body_point(body, k)] ? 0 : p->per;
+        pal_quad_store(p->to + 3 * (size_t)k, free * (pal_v8_low(p->solver->memory[k].sum) - body->active_nodes->f[k]));
+    }
+}
+
 static bool multiply_stiffness(void *user, const double *v, double *out)
 {
     rk4 *solver = user;
     pal_body *body = solver->step->body;
-    pal_active_nodes *nodes = body->active_nodes;
+    pass p = {.from = v, .to = out};
     double max2 = 0;
+    begin_pass(&p, solver, body);
     for (int k = 0; k < body->n_active; k++) max2 = fmax(max2, pal_dot3(v + 3 * (size_t)k, v + 3 * (size_t)k));
-    double small = max2 > 0 ? PAL_DIFFERENCE_H * body->edge_m / sqrt(max2) : 0, per = max2 > 0 ? 1 / small : 0;
-    for (int k = 0; k < body->n_active; k++) {
-        pal_quad move = small * pal_quad_load(v + 3 * (size_t)k);
-        nodes->xv[k] = pal_v8_join(pal_v8_low(solver->memory[k].from) + move, (pal_quad){0});
-    }
-    if (find_forces(solver, solver->step)) return false;
-    for (int k = 0; k < body->n_active; k++) {
-        double free = body->support[pal_body_point(body, k)] ? 0 : per;
-        pal_quad_store(out + 3 * (size_t)k, free * (pal_v8_low(solver->memory[k].sum) - nodes->f[k]));
-    }
+    p.small = max2 > 0 ? PAL_DIFFERENCE_H * body->edge_m / sqrt(max2) : 0, p.per = max2 > 0 ? 1 / p.small : 0;
+    share(&p, displace_part);
+    if (find_forces(&p, solver->step)) return false;
+    share(&p, subtract_part);
     return true;
 }
 
@@ -186,9 +248,12 @@ static bool solve_mass(void *user, const double *b, double *out)
 static double run_lanczos(rk4 *solver, pal_step *step)
 {
     const pal_body *body = step->body;
+    pass p = {.n_part = 0};
     solver->step = step;
-    load_state(solver, step);
-    if (find_forces(solver, step)) return NAN;
+    solver->packed = pal_active_nodes_complete(step);
+    begin_pass(&p, solver, step->body);
+    share(&p, load_part);
+    if (find_forces(&p, step)) return NAN;
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         double *z = solver->lanczos.z + 3 * (size_t)k, weight = solver->stiff[i] / sqrt(body->mass_kg[i]);
@@ -326,14 +391,17 @@ static rates find_rates(double dt_s, double rate)
                    .weight = {both(dt_s / 6, weight[0]), both(dt_s / 3, weight[1]), both(dt_s / 6, weight[2])}};
 }
 
-/* inverse masses: fixed nodes have no acceleration, and those that do not move no velocity */
-static void find_inverse_masses(rk4 *solver, const pal_body *body, const rates *r, bool adds_mass)
+/* the body's state, and inverse masses: fixed nodes have no acceleration, and those that do not move no velocity */
+static void begin_part(pass *p, int first, int end, part_result *out)
 {
-    double t = r->dt / solver->reach;
-    for (int k = 0; k < body->n_active; k++) {
+    rk4 *solver = p->solver;
+    const pal_body *body = p->body;
+    const double t = p->rates->dt / solver->reach;
+    load_part(p, first, end, out);
+    for (int k = first; k < end; k++) {
         int i = pal_body_point(body, k);
         double mass = body->mass_kg[i];
-        if (adds_mass) mass = fmax(mass, fmax(t * t * solver->stiff[i], t * solver->damp[i]));
+        if (p->adds_mass) mass = fmax(mass, fmax(t * t * solver->stiff[i], t * solver->damp[i]));
         solver->inverse_kg[k] = body->support[i] ? 0 : 1 / mass;
         solver->prescribed[k] = body->support[i] == PAL_PRESCRIBED;
         if (body->support[i] == PAL_FIXED)
@@ -347,53 +415,67 @@ PAL_INLINE pal_v8 rate_of(const rk4 *solver, const pal_active_nodes *nodes, int 
     return pal_v8_join(pal_v8_high(nodes->xv[k]), solver->inverse_kg[k] * nodes->f[k]);
 }
 
-/* the state at the start, and the second stage's */
-static void stage_first(rk4 *solver, const pal_body *body, const rates *r)
+/* the state at the start, and the second stage's. As after the other stages, forces begin as the loads again */
+static void stage_first(pass *p, int first, int end, part_result *out)
 {
-    pal_active_nodes *nodes = body->active_nodes;
-    for (int k = 0; k < body->n_active; k++) {
+    rk4 *solver = p->solver;
+    const rates *r = p->rates;
+    pal_active_nodes *nodes = p->body->active_nodes;
+    (void)out;
+    for (int k = first; k < end; k++) {
         memory *m = &solver->memory[k];
         const pal_v8 y = nodes->xv[k], rate = rate_of(solver, nodes, k);
         m->from = y;
         m->sum = r->whole[solver->prescribed[k]] * y + r->weight[0] * rate;
         nodes->xv[k] = r->half[solver->prescribed[k]] * y + r->grow * rate;
+        nodes->f[k] = solver->load[k];
     }
 }
 
 /* the third stage's state from the second stage's forces. The fourth stage's velocity continues from the second's
  * after drag, less the contribution of the first acceleration */
-static void stage_second(rk4 *solver, const pal_body *body, const rates *r)
+static void stage_second(pass *p, int first, int end, part_result *out)
 {
-    pal_active_nodes *nodes = body->active_nodes;
-    for (int k = 0; k < body->n_active; k++) {
+    rk4 *solver = p->solver;
+    const rates *r = p->rates;
+    pal_active_nodes *nodes = p->body->active_nodes;
+    (void)out;
+    for (int k = first; k < end; k++) {
         memory *m = &solver->memory[k];
         const pal_v8 y = nodes->xv[k], rate = rate_of(solver, nodes, k), half = r->half[solver->prescribed[k]];
         const pal_v8 saved = half * m->from, next = half * y - (y - saved);
         m->sum += r->weight[1] * rate;
         m->from = pal_v8_join(pal_v8_low(m->from), pal_v8_high(next));
         nodes->xv[k] = saved + r->grow * rate;
+        nodes->f[k] = solver->load[k];
     }
 }
 
 /* the fourth stage's state from the third stage's forces */
-static void stage_third(rk4 *solver, const pal_body *body, const rates *r)
+static void stage_third(pass *p, int first, int end, part_result *out)
 {
-    pal_active_nodes *nodes = body->active_nodes;
-    for (int k = 0; k < body->n_active; k++) {
+    rk4 *solver = p->solver;
+    const rates *r = p->rates;
+    pal_active_nodes *nodes = p->body->active_nodes;
+    (void)out;
+    for (int k = first; k < end; k++) {
         memory *m = &solver->memory[k];
         const pal_v8 rate = rate_of(solver, nodes, k);
         m->sum += r->weight[1] * rate;
         nodes->xv[k] = m->from + r->last * rate;
+        nodes->f[k] = solver->load[k];
     }
 }
 
-/* the final state from the fourth stage's forces; returns the square of the largest displacement, NaN if one is NaN */
-static double stage_last(rk4 *solver, const pal_body *body, const rates *r)
+/* the final state from the fourth stage's forces; and the square of the largest displacement */
+static void stage_last(pass *p, int first, int end, part_result *out)
 {
-    pal_active_nodes *nodes = body->active_nodes;
+    rk4 *solver = p->solver;
+    const rates *r = p->rates;
+    pal_active_nodes *nodes = p->body->active_nodes;
     const double dt2 = r->dt * r->dt;
     double max2 = 0, non_finite = 0;
-    for (int k = 0; k < body->n_active; k++) {
+    for (int k = first; k < end; k++) {
         const memory *m = &solver->memory[k];
         const pal_v8 sum = m->sum + r->weight[2] * rate_of(solver, nodes, k), square = sum * sum;
         double move2 = square[0] + square[1] + square[2], v2 = dt2 * (square[4] + square[5] + square[6]);
@@ -402,21 +484,33 @@ static double stage_last(rk4 *solver, const pal_body *body, const rates *r)
         move2 = v2 > move2 ? v2 : move2;
         max2 = move2 > max2 ? move2 : max2;
     }
-    return max2 + non_finite;
+    out->max2 = max2 + non_finite;
 }
 
 /* limits displacements to max_m, and velocities that would cause longer ones */
-static void clamp_moves(const rk4 *solver, pal_body *body, double dt_s, double max_m)
+static void clamp_moves(const pass *p, int first, int end, part_result *out)
 {
-    for (int k = 0; k < body->n_active; k++) {
-        pal_v8 *to = &body->active_nodes->xv[k];
-        pal_quad from = pal_v8_low(solver->memory[k].from), move = pal_v8_low(*to) - from, v = pal_v8_high(*to);
-        double move_m = sqrt(pal_quad_dot(move, move)), speed = sqrt(pal_quad_dot(v, v)) * dt_s;
+    const uint64_t before = pal_clock_ns();
+    const double max_m = p->max_m;
+    for (int k = first; k < end; k++) {
+        pal_v8 *to = &p->body->active_nodes->xv[k];
+        pal_quad from = pal_v8_low(p->solver->memory[k].from), move = pal_v8_low(*to) - from, v = pal_v8_high(*to);
+        double move_m = sqrt(pal_quad_dot(move, move)), speed = sqrt(pal_quad_dot(v, v)) * p->rates->dt;
         if (move_m > max_m) move *= max_m / move_m;
         if (speed > max_m) v *= max_m / speed;
         if (move_m > max_m || speed > max_m) *to = pal_v8_join(from + move, v);
-        body->safeguards.n_clamped += move_m > max_m || speed > max_m;
+        out->n_clamped += move_m > max_m || speed > max_m;
     }
+    out->ns = pal_clock_ns() - before;
+}
+
+/* the last stage, of which the body takes state and forces */
+static void end_part(pass *p, int first, int end, part_result *out)
+{
+    *out = (part_result){0};
+    stage_last(p, first, end, out);
+    if (sqrt(out->max2) > p->max_m) clamp_moves(p, first, end, out);
+    store_part(p, first, end, out);
 }
 
 static pal_err run(void *self, pal_step *step)
@@ -424,27 +518,29 @@ static pal_err run(void *self, pal_step *step)
     rk4 *solver = self;
     pal_body *body = step->body;
     const rates r = find_rates(step->dt_s, pal_guard_drag_1_s(step->force, step->n_force));
+    pass p = {.rates = &r, .max_m = pal_guard_max_move_m(body), .adds_mass = step->adds_mass};
     step->drag_separate = true;
-    load_state(solver, step);
-    find_inverse_masses(solver, body, &r, step->adds_mass);
-    PAL_TRY(find_forces(solver, step));
-    stage_first(solver, body, &r);
-    PAL_TRY(find_forces(solver, step));
-    stage_second(solver, body, &r);
-    PAL_TRY(find_forces(solver, step));
-    stage_third(solver, body, &r);
-    PAL_TRY(find_forces(solver, step));
-    double move_m = sqrt(stage_last(solver, body, &r)), max = pal_guard_max_move_m(body);
-    if (move_m > max) {
-        uint64_t before = pal_clock_ns();
-        clamp_moves(solver, body, step->dt_s, max);
-        body->safeguards.ns += pal_clock_ns() - before;
+    solver->packed = pal_active_nodes_complete(step);
+    begin_pass(&p, solver, body);
+    share(&p, begin_part);
+    PAL_TRY(find_forces(&p, step));
+    share(&p, stage_first);
+    PAL_TRY(find_forces(&p, step));
+    share(&p, stage_second);
+    PAL_TRY(find_forces(&p, step));
+    share(&p, stage_third);
+    PAL_TRY(find_forces(&p, step));
+    /* for support reactions */
+    p.stores_forces = solver->packed && step->sub == step->n_sub - 1;
+    share(&p, end_part);
+    double max2 = 0, non_finite = 0;
+    for (int k = 0; k < p.n_part; k++) {
+        max2 = p.result[k].max2 > max2 ? p.result[k].max2 : max2;
+        non_finite += 0 * p.result[k].max2;
+        body->safeguards.n_clamped += p.result[k].n_clamped, body->safeguards.ns += p.result[k].ns;
     }
-    store_motion(body);
-    /* forces of the fourth stage, for support reactions */
-    for (int k = 0; k < body->n_active && solver->packed; k++)
-        pal_quad_store(body->f + 3 * (size_t)pal_body_point(body, k), body->active_nodes->f[k]);
-    solver->moved_m += move_m > max ? max : move_m;
+    const double move_m = sqrt(max2 + non_finite);
+    solver->moved_m += move_m > p.max_m ? p.max_m : move_m;
     solver->n_since += solver->n_since < PAUSE;
     if (step->sub == 0) solver->step_s = step->dt_s * step->n_sub;
     return PAL_ERR_OK;
@@ -476,7 +572,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     if (!solver->memory || !solver->load || !solver->prescribed ||
         !PAL_NEW_DOUBLES(build->arena, body->n_dof, &solver->stiff, &solver->damp, &solver->inverse_kg))
         return PAL_ERR_MEMORY;
-    PAL_TRY(pal_active_nodes_make(build->body, build->body_arena ? build->body_arena : build->arena));
+    PAL_TRY(pal_active_nodes_make(build));
     pal_lanczos *lanczos = &solver->lanczos;
     const size_t n3 = 3 * (size_t)body->n_dof;
     lanczos->multiply = multiply_stiffness, lanczos->solve = solve_mass, lanczos->user = solver, lanczos->n_basis = 2;

@@ -1,29 +1,42 @@
 /* Packing of a body's active dofs, and FORCE components on them. */
 #include "server/sim/surface/active_nodes.h"
 
-pal_err pal_active_nodes_make(pal_body *body, pal_arena *arena)
+#include "server/sim/core/tuning.h"
+
+pal_err pal_active_nodes_make(const pal_build *build)
 {
+    pal_body *body = build->body;
+    pal_arena *arena = build->body_arena ? build->body_arena : build->arena;
     if (body->active_nodes) return PAL_ERR_OK;
     pal_active_nodes *pack = PAL_NEW(arena, pal_active_nodes, 1);
     if (!pack) return PAL_ERR_MEMORY;
-    pack->xv = PAL_NEW(arena, pal_v8, body->n_dof);
-    pack->f = PAL_NEW(arena, pal_quad, body->n_dof);
+    const int n_line = (body->n_dof + PAL_LANES - 1) & -PAL_LANES;
+    if (build->scene->threads > 1) pack->first_copy = pack->n_copy = n_line;
+    pack->xv = PAL_NEW(arena, pal_v8, n_line + pack->n_copy);
+    pack->f = PAL_NEW(arena, pal_quad, n_line + pack->n_copy);
     pack->rest = PAL_NEW(arena, pal_quad, body->n_dof);
     if (!pack->xv || !pack->f || !pack->rest) return PAL_ERR_MEMORY;
     body->active_nodes = pack;
     return PAL_ERR_OK;
 }
 
+int pal_active_parts(const pal_body *body)
+{
+    const int max = body->n_active / PAL_PART_ACTIVE, size = body->team ? pal_team_size(body->team) : 1;
+    return max < 1 ? 1 : max < size ? max : size;
+}
+
+static void load_part(void *user, int worker, int part)
+{
+    const pal_body *body = *(const pal_body *const *)user;
+    const int n_part = pal_active_parts(body), end = pal_active_first(body, n_part, part + 1);
+    (void)worker;
+    for (int k = pal_active_first(body, n_part, part); k < end; k++) pal_active_node_load(body, k);
+}
+
 void pal_active_nodes_load(const pal_body *body)
 {
-    pal_active_nodes *pack = body->active_nodes;
-    for (int k = 0; k < body->n_active; k++) {
-        size_t i = (size_t)pal_body_point(body, k);
-        pal_quad rest = pal_quad_load(body->x_rest + 3 * i);
-        rest[3] = body->mass_kg[i];
-        pack->rest[k] = rest;
-        pack->xv[k] = pal_v8_join(pal_quad_load(body->x + 3 * i), pal_quad_load(body->v + 3 * i));
-    }
+    pal_team_run(body->team, pal_active_parts(body), load_part, &body);
 }
 
 bool pal_active_nodes_complete(const pal_step *step)

@@ -3,6 +3,8 @@
  *
  * One walk from the faces of level 0 down through split ones, so the cost follows the active part. Faces of a level are
  * met in ascending order; a midpoint is listed by the first split face beside its edge, a spring by the first leaf.
+ * Nodes are then brought into the order of slabs across the longest axis, so that neighbours are near in memory and
+ * threads can share them (active_nodes.h).
  *
  * Departures: masses are rescaled so that their sum is M (erratum C5); the law for springs is a choice (C4). */
 #include "server/sim/surface/adaptive_surface.h"
@@ -202,6 +204,17 @@ static void find_rest_centre(pal_adaptive_surface *s, const pal_body *body)
     s->rest_kg_m2 = square;
 }
 
+/* brings the nodes into the order of their slabs; within a slab they stay as the walk has met them */
+static void sort_nodes(pal_adaptive_surface *s)
+{
+    int first[PAL_ADAPTIVE_SLABS + 1] = {0};
+    int32_t *met = s->n_beside;
+    memcpy(met, s->node, sizeof *met * (size_t)s->n_node);
+    for (int k = 0; k < s->n_node; k++) first[s->slab[met[k]] + 1]++;
+    for (int b = 0; b < PAL_ADAPTIVE_SLABS; b++) first[b + 1] += first[b];
+    for (int k = 0; k < s->n_node; k++) s->node[first[s->slab[met[k]]]++] = met[k];
+}
+
 bool pal_adaptive_update(pal_adaptive_surface *s, pal_body *body)
 {
     if (!s->stale) return false;
@@ -215,6 +228,7 @@ bool pal_adaptive_update(pal_adaptive_surface *s, pal_body *body)
     s->n_node = l->n_vertex[0];
     for (int32_t v = 0; v < l->n_vertex[0]; v++) s->node[v] = v;
     for (int32_t f = 0; f < l->first_face[1]; f++) visit(&w, f, 0);
+    sort_nodes(s);
     s->stale = false;
     PAL_ASSERT(s->n_node == s->n_live);
     body->n_active = s->n_node;

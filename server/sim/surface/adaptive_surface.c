@@ -50,7 +50,7 @@ static room room_of(const pal_levels *l)
 static size_t state_bytes(const room *r)
 {
     return r->all_face + r->all_edge + r->face * 7 * sizeof(int32_t) + r->edge * (sizeof(int32_t) + sizeof(float)) +
-           r->vertex * (2 * sizeof(int32_t) + 16 * sizeof(double) + 1) + r->log * sizeof(int32_t);
+           r->vertex * (2 * sizeof(int32_t) + 16 * sizeof(double) + 2) + r->log * sizeof(int32_t);
 }
 
 static void *copy_of(pal_arena *arena, const void *from, size_t n_byte)
@@ -87,13 +87,14 @@ static bool get_state(pal_adaptive_surface *s, pal_arena *arena)
     s->spring_share = PAL_NEW(arena, float, r.edge);
     s->node = PAL_NEW(arena, int32_t, r.vertex);
     s->n_beside = PAL_NEW(arena, int32_t, r.vertex);
+    s->slab = PAL_NEW(arena, uint8_t, r.vertex);
     s->slot = PAL_NEW(arena, int32_t, 3 * r.face);
     s->tri = PAL_NEW(arena, int32_t, 3 * r.face);
     s->log = PAL_NEW(arena, int32_t, r.log);
     s->chain = PAL_NEW(arena, int32_t, CHAIN);
     s->fresh = PAL_NEW(arena, int32_t, FRESH);
     return s->face_state && s->edge_split && s->leaf && s->spring && s->spring_share && s->node && s->n_beside &&
-           s->slot && s->tri && s->log && s->chain && s->fresh;
+           s->slab && s->slot && s->tri && s->log && s->chain && s->fresh;
 }
 
 double pal_adaptive_mean_edge_m(const pal_levels *l, int level)
@@ -102,6 +103,20 @@ double pal_adaptive_mean_edge_m(const pal_levels *l, int level)
     for (int32_t e = l->first_edge[level]; e < l->first_edge[level + 1]; e++)
         sum += pal_dist3(l->x + 3 * (size_t)l->edge[e].vertex[0], l->x + 3 * (size_t)l->edge[e].vertex[1]);
     return sum / pal_levels_n_edge(l, level);
+}
+
+/* slabs of equal width */
+static void find_slabs(pal_adaptive_surface *s)
+{
+    const pal_levels *l = &s->levels;
+    const int n = l->n_vertex[l->n_level - 1];
+    double low[3], high[3];
+    int axis = 0;
+    pal_surface_box(&(pal_surface){.n_vertex = n, .x = l->x}, low, high);
+    for (int c = 1; c < 3; c++)
+        if (high[c] - low[c] > high[axis] - low[axis]) axis = c;
+    const double length_m = high[axis] - low[axis], per_m = length_m > 0 ? (PAL_ADAPTIVE_SLABS - 1) / length_m : 0;
+    for (int i = 0; i < n; i++) s->slab[i] = (uint8_t)(per_m * (l->x[3 * (size_t)i + (size_t)axis] - low[axis]));
 }
 
 static pal_err make_body(pal_adaptive_surface *s, pal_body *body, pal_arena *arena)
@@ -150,6 +165,7 @@ pal_err pal_adaptive_make(const pal_surface *surface, const pal_adaptive_options
     s->options.budget_byte = budget;
     s->n_byte = n_byte;
     for (int k = 0; k < s->levels.n_level; k++) s->level_mass_kg[k] = options->mass_kg / s->levels.n_vertex[k];
+    find_slabs(s);
     PAL_TRY(make_body(s, body, arena));
     pal_adaptive_set_level(s, body, options->start_level);
     pal_adaptive_update(s, body);

@@ -38,6 +38,9 @@ typedef enum pal_midpoint_placement { PAL_MIDPOINT_LINEAR, PAL_MIDPOINT_BUTTERFL
 typedef enum pal_adaptive_mass { PAL_MASS_BY_NODES, PAL_MASS_BY_FACES } pal_adaptive_mass;
 typedef enum pal_face_state { PAL_FACE_ABSENT, PAL_FACE_LEAF, PAL_FACE_SPLIT } pal_face_state;
 
+/* slabs across the longest axis of the box at rest, by which the nodes are in order */
+enum { PAL_ADAPTIVE_SLABS = 256 };
+
 typedef struct pal_adaptive_options {
     int n_level;        /* 1..PAL_LEVELS_MAX */
     int start_level;    /* 0..n_level-1: all leaves have it at load and after reset */
@@ -63,7 +66,7 @@ typedef struct pal_adaptive_surface {
     int32_t *leaf;                /* faces                                    [n_leaf]       */
     int32_t *spring;              /* edges                                    [n_spring]     */
     float *spring_share;          /* stiffness of each over k_0, by the law   [n_spring]     */
-    int32_t *node;                /* vertices, those of level 0 first; body->active [n_node] */
+    int32_t *node;                /* vertices along the longest axis; body->active [n_node] */
     int n_leaf_of[PAL_LEVELS_MAX];
     double mass_scale; /* of the C5 rescaling, near 1 */
     /* common factors on the stiffness of springs and anchors, in force, energy and bounds alike. They keep the energy
@@ -88,6 +91,7 @@ typedef struct pal_adaptive_surface {
     bool stale;                          /* the state has changed since the last update                        */
     int32_t *n_beside;                   /* springs of each node                              [n finest]       */
     int32_t *chain, *fresh;              /* faces and edges of one call of split                               */
+    uint8_t *slab;                       /* of each vertex, along the longest axis of the box at rest [n finest] */
     double rest_centre_m[3], rest_kg_m2; /* weighted by the present masses; trace of the second moments about it */
 } pal_adaptive_surface;
 
@@ -147,7 +151,6 @@ typedef struct pal_rigid_fit {
     double V_m_s[3], Omega_1_s[3];
 } pal_rigid_fit;
 void pal_adaptive_fit_rigid(const pal_adaptive_surface *adaptive, const pal_body *body, pal_rigid_fit *frame);
-/* the same for packed dofs (active_nodes.h) */
-void pal_adaptive_fit_rigid_active(const pal_adaptive_surface *adaptive, const struct pal_active_nodes *pack,
-                                   pal_rigid_fit *frame);
+/* the same, to the bit, for packed dofs (active_nodes.h), by the threads of the body's team */
+void pal_adaptive_fit_rigid_active(const pal_adaptive_surface *adaptive, const pal_body *body, pal_rigid_fit *frame);
 #endif

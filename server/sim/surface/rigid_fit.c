@@ -2,15 +2,19 @@
  * move (erratum C7) and for speeds measured against it.
  *
  * A = sum m (x - c)(x0 - c0)', R its rotation; L = sum m (x - c) x (v - V) = I Omega. One pass over the nodes, about
- * the first of them: as sum m (x0 - c0) = 0, A needs no centre of x. */
+ * the first of them: as sum m (x0 - c0) = 0, A needs no centre of x. The nodes are summed in CHUNKS chunks, and these
+ * in their order, so that threads share the pass and the bits do not depend on their number. */
 #include "server/sim/surface/adaptive_surface.h"
 
+#include "server/base/team.h"
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
 #include "server/sim/core/rigid_motion.h"
 #include "server/sim/surface/active_nodes.h"
 
 #include <math.h>
+
+enum { CHUNKS = 16 };
 
 typedef struct sums {
     double mass, x[3], v[3]; /* x about the first node     */
@@ -58,24 +62,58 @@ static void fit(const pal_adaptive_surface *s, const double from[3], sums t, pal
     pal_rigid_spin(inertia, moment, PAL_ROUNDING * PAL_ROUNDING * s->rest_kg_m2, frame->Omega_1_s);
 }
 
+static void add_sums(sums *to, const sums *from)
+{
+    double *sum = (double *)to;
+    const double *add = (const double *)from;
+    for (size_t k = 0; k < sizeof *to / sizeof *sum; k++) sum[k] += add[k];
+}
+
 void pal_adaptive_fit_rigid(const pal_adaptive_surface *s, const pal_body *body, pal_rigid_fit *frame)
 {
     const double *from = body->x + 3 * (size_t)s->node[0];
     sums t = {0};
-    for (int k = 0; k < s->n_node; k++) {
-        const size_t i = (size_t)s->node[k];
-        add_node(&t, from, s->rest_centre_m, body->mass_kg[i], body->x + 3 * i, body->x_rest + 3 * i, body->v + 3 * i);
+    for (int chunk = 0; chunk < CHUNKS; chunk++) {
+        const int end = pal_part_first(s->n_node, CHUNKS, chunk + 1);
+        sums part = {0};
+        for (int k = pal_part_first(s->n_node, CHUNKS, chunk); k < end; k++) {
+            const size_t i = (size_t)s->node[k];
+            add_node(&part, from, s->rest_centre_m, body->mass_kg[i], body->x + 3 * i, body->x_rest + 3 * i,
+                     body->v + 3 * i);
+        }
+        add_sums(&t, &part);
     }
     fit(s, from, t, frame);
 }
 
-void pal_adaptive_fit_rigid_active(const pal_adaptive_surface *s, const pal_active_nodes *pack, pal_rigid_fit *frame)
+typedef struct fit_pass {
+    const pal_adaptive_surface *s;
+    const pal_active_nodes *pack;
+    int n_part;
+    sums chunk[CHUNKS];
+} fit_pass;
+
+static void sum_part(void *user, int worker, int part)
 {
-    const double *from = (const double *)pack->xv;
-    sums t = {0};
-    for (int k = 0; k < s->n_node; k++) {
-        const double *x = (const double *)&pack->xv[k], *rest = (const double *)&pack->rest[k];
-        add_node(&t, from, s->rest_centre_m, rest[3], x, rest, x + 4);
+    fit_pass *p = user;
+    const double *from = (const double *)p->pack->xv;
+    (void)worker;
+    for (int c = pal_part_first(CHUNKS, p->n_part, part); c < pal_part_first(CHUNKS, p->n_part, part + 1); c++) {
+        const int end = pal_part_first(p->s->n_node, CHUNKS, c + 1);
+        sums t = {0};
+        for (int k = pal_part_first(p->s->n_node, CHUNKS, c); k < end; k++) {
+            const double *x = (const double *)&p->pack->xv[k], *rest = (const double *)&p->pack->rest[k];
+            add_node(&t, from, p->s->rest_centre_m, rest[3], x, rest, x + 4);
+        }
+        p->chunk[c] = t;
     }
-    fit(s, from, t, frame);
+}
+
+void pal_adaptive_fit_rigid_active(const pal_adaptive_surface *s, const pal_body *body, pal_rigid_fit *frame)
+{
+    fit_pass p = {.s = s, .pack = body->active_nodes, .n_part = pal_active_parts(body)};
+    sums t = {0};
+    pal_team_run(body->team, p.n_part, sum_part, &p);
+    for (int c = 0; c < CHUNKS; c++) add_sums(&t, &p.chunk[c]);
+    fit(s, (const double *)p.pack->xv, t, frame);
 }

@@ -25,7 +25,8 @@ pal_err pal_world_load(pal_world *world, int body, int node, const double force_
     return PAL_ERR_OK;
 }
 
-/* inactive nodes have no load (adaptive_surface.h) and keep theirs in external_force until they are active again */
+/* inactive nodes have no load (adaptive_surface.h) and keep theirs in external_force until they are active again. What
+ * does not change is not written, so that it stays in the caches of the threads that share the step */
 void pal_body_begin_loads(pal_body *body)
 {
     static const double none[3] = {0};
@@ -33,7 +34,8 @@ void pal_body_begin_loads(pal_body *body)
     const size_t n_byte = 3 * sizeof(double) * (size_t)body->n_node;
     for (int k = 0; k < body->n_active && body->active; k++) {
         const size_t i = 3 * (size_t)body->active[k];
-        pal_copy3(body->load + i, lasting ? lasting + i : none);
+        const double *from = lasting ? lasting + i : none;
+        if (memcmp(body->load + i, from, sizeof none)) pal_copy3(body->load + i, from);
     }
     if (!body->active && lasting) memcpy(body->load, lasting, n_byte);
     if (!body->active && !lasting) memset(body->load, 0, n_byte);
