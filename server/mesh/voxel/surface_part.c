@@ -1,13 +1,20 @@
 /* Parts of a surface: components over edges that are matched by position, a common orientation, cavities.
  *
- * The sides of triangles, sorted by the positions of their ends, join them into parts (any shared edge) and into
- * patches of one orientation (edges of exactly two triangles, union-find with a parity bit). A part that is a closed
- * chain keeps its orientation; others take that of the patches. */
+ * The sides of triangles, sorted by the positions of their ends, join them into patches of one orientation (edges of
+ * exactly two triangles, union-find with a parity bit) and these into parts (any shared edge). A part that is a closed
+ * chain keeps its orientation; others take that of the patches. All but the edges of two opposite sides are listed, and
+ * what follows looks at the list alone. Copies of a triangle share its edges, so the walk over these finds whether
+ * there can be any before they are looked for. */
 #include "server/mesh/voxel/surface_part.h"
 
 #include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/num/union_find.h"
+
+/* sides of an edge that are not two opposite ones */
+typedef struct odd_edge {
+    int32_t first, n;
+} odd_edge;
 
 typedef struct finder {
     const pal_scan_surface *scan;
@@ -15,7 +22,10 @@ typedef struct finder {
     int32_t *tri;   /* places of the corners, oriented as in the file   [n_tri][3] */
     int32_t *row;   /* sides by the smaller of their places (pal_surface_sides)    */
     pal_surface_side *side;
+    odd_edge *odd; /* ascending             [n_odd]                                    */
+    int64_t n_odd;
     size_t n_open;         /* edges of one triangle                                             */
+    bool may_have_copies;  /* two triangles may have the same corners                           */
     int32_t *joined;       /* union-find of parts   [n_tri]                                     */
     int32_t *patch;        /* union-find of patches [n_tri]                                     */
     uint8_t *reversed_of;  /* orientation against the patch parent; finally against the root */
@@ -46,26 +56,29 @@ static int side_sign(const finder *f, const pal_surface_side *side)
     return side->high == f->tri[side->corner] ? -1 : 1;
 }
 
-/* calls take for the n sides of each edge; a side between equal places is none */
-static void each_edge(finder *f, void *self, void (*take)(finder *f, void *self, const pal_surface_side *side, int n))
+/* place of the corner that a side does not have */
+static int32_t opposite_place(const finder *f, const pal_surface_side *side)
 {
-    for (int32_t low = 0; low < f->scan->n_vertex; low++)
-        for (int32_t k = f->row[low], end = k; k < f->row[low + 1]; k = end) {
-            while (end < f->row[low + 1] && f->side[end].high == f->side[k].high) end++;
-            if (f->side[k].high != low) take(f, self, f->side + k, end - k);
-        }
+    const int32_t first = side->corner / 3 * 3, k = side->corner - first;
+    return f->tri[first + (k == 0 ? 2 : k - 1)];
 }
 
-/* an edge joins its triangles to a part; one of exactly two relates their orientations */
-static void join_edge(finder *f, void *self, const pal_surface_side *side, int n)
+/* more sides of an edge than these are not compared */
+enum { COMPARED = 8 };
+
+static bool has_copies(const finder *f, const pal_surface_side *side, int n)
 {
-    (void)self;
-    const int32_t first = side[0].corner / 3;
-    for (int k = 1; k < n; k++) pal_union_find_join(f->joined, side[k].corner / 3, first);
-    f->n_open += n == 1;
-    if (n != 2) return;
-    uint8_t reversed_a, reversed_b, differ = side_sign(f, &side[0]) == side_sign(f, &side[1]);
-    int32_t a = find_patch(f, first, &reversed_a), b = find_patch(f, side[1].corner / 3, &reversed_b);
+    bool any = n > COMPARED;
+    for (int k = 1; k < n && !any; k++)
+        for (int i = 0; i < k; i++) any |= opposite_place(f, &side[i]) == opposite_place(f, &side[k]);
+    return any;
+}
+
+/* an edge of exactly two triangles relates their orientations */
+static void join_patches(finder *f, const pal_surface_side *side, uint8_t differ)
+{
+    uint8_t reversed_a, reversed_b;
+    int32_t a = find_patch(f, side[0].corner / 3, &reversed_a), b = find_patch(f, side[1].corner / 3, &reversed_b);
     if (a == b) {
         if ((reversed_a ^ reversed_b) != differ) f->inconsistent[a] = 1;
         return;
@@ -74,6 +87,37 @@ static void join_edge(finder *f, void *self, const pal_surface_side *side, int n
     f->patch[high] = low;
     f->reversed_of[high] = reversed_a ^ reversed_b ^ differ;
     f->inconsistent[low] |= f->inconsistent[high];
+}
+
+/* joins patches and lists odd edges; a side between equal places is none; MEMORY */
+static pal_err walk_edges(finder *f)
+{
+    for (int32_t low = 0; low < f->scan->n_vertex; low++)
+        for (int32_t k = f->row[low], end = k; k < f->row[low + 1]; k = end) {
+            const pal_surface_side *side = f->side + k;
+            while (end < f->row[low + 1] && f->side[end].high == side->high) end++;
+            const int n = end - k;
+            const bool opposed = n == 2 && side_sign(f, &side[0]) != side_sign(f, &side[1]);
+            if (side->high == low) continue;
+            f->may_have_copies |= has_copies(f, side, n);
+            if (n == 2) join_patches(f, side, !opposed);
+            if (opposed) continue;
+            if (!PAL_GROW(f->odd, f->n_odd)) return PAL_ERR_MEMORY;
+            f->odd[f->n_odd++] = (odd_edge){k, n};
+            f->n_open += n == 1;
+        }
+    return PAL_ERR_OK;
+}
+
+/* parts: patches, and what meets at edges of more than two triangles */
+static void join_parts(finder *f)
+{
+    uint8_t reversed;
+    for (int32_t t = 0; t < f->scan->n_tri; t++) f->joined[t] = find_patch(f, t, &reversed);
+    for (int64_t i = 0; i < f->n_odd; i++) {
+        const pal_surface_side *side = f->side + f->odd[i].first;
+        for (int k = 1; k < f->odd[i].n; k++) pal_union_find_join(f->joined, side[k].corner / 3, side[0].corner / 3);
+    }
 }
 
 /* the first vertex at the position of each; MEMORY */
@@ -106,13 +150,15 @@ static pal_err find_edges(finder *f)
     PAL_ZEROED(&err, f->inconsistent, n);
     if (err) return err;
     for (size_t c = 0; c < 3 * n; c++) f->tri[c] = f->place[f->scan->tri[c]];
+    for (const int32_t *c = f->tri; c < f->tri + 3 * n; c += 3)
+        f->may_have_copies |= c[0] == c[1] || c[1] == c[2] || c[2] == c[0];
     const pal_surface placed = {.n_vertex = f->scan->n_vertex, .n_tri = f->scan->n_tri, .tri = f->tri};
     err = pal_surface_sides(&placed, &f->row, &f->side);
     if (err) f->row = NULL, f->side = NULL;
     if (err) return err;
-    pal_union_find_init(f->joined, f->scan->n_tri);
     pal_union_find_init(f->patch, f->scan->n_tri);
-    each_edge(f, NULL, join_edge);
+    PAL_TRY(walk_edges(f));
+    join_parts(f);
     return PAL_ERR_OK;
 }
 
@@ -122,9 +168,9 @@ typedef struct chain {
     double centre[3], volume;
 } chain;
 
-static void count_edge(finder *f, void *self, const pal_surface_side *side, int n)
+static void count_edge(finder *f, chain *chains, const pal_surface_side *side, int n)
 {
-    chain *c = (chain *)self + f->scan->part[side->corner / 3];
+    chain *c = chains + f->scan->part[side->corner / 3];
     int given = 0, repaired = 0;
     for (int k = 0; k < n; k++) {
         uint8_t reversed = 0;
@@ -163,16 +209,13 @@ typedef struct hole {
     double sum[3];
 } hole;
 
-/* appends an open edge in the current orientation of its triangle */
-static void list_open(finder *f, void *self, const pal_surface_side *side, int n)
+/* an open edge in the current orientation of its triangle */
+static open_edge open_edge_of(const finder *f, const pal_surface_side *side)
 {
-    open_edge **to = self;
-    if (n != 1) return;
-    const int32_t t = side->corner / 3, *c = f->scan->tri + 3 * (size_t)t,
-                  opposite = f->tri[3 * (size_t)t + (size_t)((side->corner + 2) % 3)];
+    const int32_t t = side->corner / 3, *c = f->scan->tri + 3 * (size_t)t, opposite = opposite_place(f, side);
     int k = 0;
     while (f->place[c[k]] != opposite) k++;
-    *(*to)++ = (open_edge){t, c[(k + 1) % 3], c[(k + 2) % 3]};
+    return (open_edge){t, c[(k + 1) % 3], c[(k + 2) % 3]};
 }
 
 /* adds the volumes between the fans that close the holes and the centre of each part to the volumes of the parts;
@@ -191,7 +234,8 @@ static pal_err close_holes(finder *f, chain *chains)
     PAL_ZEROED(&err, holes, scan->n_vertex);
     if (!err) {
         open_edge *to = open;
-        each_edge(f, &to, list_open);
+        for (int64_t i = 0; i < f->n_odd; i++)
+            if (f->odd[i].n == 1) *to++ = open_edge_of(f, f->side + f->odd[i].first);
         pal_union_find_init(root, scan->n_vertex);
     }
     for (size_t i = 0; i < n_open && !err; i++) pal_union_find_join(root, open[i].a, open[i].b);
@@ -220,7 +264,7 @@ static pal_err close_holes(finder *f, chain *chains)
 static pal_err orient(pal_scan_surface *scan, finder *f, pal_parts *parts, chain *chains)
 {
     uint8_t reversed;
-    each_edge(f, chains, count_edge);
+    for (int64_t i = 0; i < f->n_odd; i++) count_edge(f, chains, f->side + f->odd[i].first, f->odd[i].n);
     for (int32_t t = 0; t < scan->n_tri; t++) {
         chain *c = &chains[scan->part[t]];
         c->inconsistent |= f->inconsistent[find_patch(f, t, &reversed)];
@@ -256,12 +300,24 @@ static pal_err orient(pal_scan_surface *scan, finder *f, pal_parts *parts, chain
     return PAL_ERR_OK;
 }
 
+static void free_finder(finder *f)
+{
+    PAL_FREE(f->place, f->tri, f->row, f->side, f->odd, f->joined, f->patch, f->reversed_of, f->inconsistent);
+    *f = (finder){.scan = f->scan};
+}
+
 pal_err pal_parts_find(pal_scan_surface *scan, pal_parts *out)
 {
     finder f = {.scan = scan};
     pal_parts parts = {0};
     chain *chains = NULL;
     pal_err err = find_edges(&f);
+    const int n_tri = scan->n_tri;
+    if (!err && f.may_have_copies) err = pal_scan_drop_copies(scan);
+    if (!err && scan->n_tri < n_tri) {
+        free_finder(&f);
+        err = find_edges(&f);
+    }
     if (!err) {
         parts.n = pal_union_find_label(f.joined, scan->n_tri);
         scan->part = f.joined, f.joined = NULL;
@@ -269,7 +325,8 @@ pal_err pal_parts_find(pal_scan_surface *scan, pal_parts *out)
         PAL_ZEROED(&err, chains, parts.n);
         if (!err) err = orient(scan, &f, &parts, chains);
     }
-    PAL_FREE(f.place, f.tri, f.row, f.side, f.joined, f.patch, f.reversed_of, f.inconsistent, chains);
+    free_finder(&f);
+    PAL_FREE(chains);
     if (err)
         pal_parts_free(&parts);
     else

@@ -24,8 +24,9 @@ typedef struct pal_parts {
     pal_part *part;
 } pal_parts;
 
-/* Finds the parts by position (unwelded corners join), numbers the parts of the triangles in scan->part, makes the
- * orientation of each part consistent where possible, and outward; cavity stays false; MEMORY */
+/* Drops copies of triangles (pal_scan_drop_copies), finds the parts by position (unwelded corners join), numbers the
+ * parts of the triangles in scan->part, makes the orientation of each part consistent where possible, and outward;
+ * cavity stays false; MEMORY */
 pal_err pal_parts_find(pal_scan_surface *scan, pal_parts *out);
 void pal_parts_free(pal_parts *parts);
 

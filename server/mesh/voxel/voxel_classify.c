@@ -207,7 +207,7 @@ static pal_err by_vote(decision *d)
 {
     const int *n = d->grid->n;
     uint8_t *vote = calloc((size_t)n[0] * (size_t)n[1] * (size_t)n[2], 1);
-    pal_err err = vote ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    pal_err err = vote ? pal_scan_find_near(d->scan) : PAL_ERR_MEMORY;
     for (int axis = 0; !err && axis < 3; axis++) err = each_row(d, axis, vote, vote_row);
     if (!err) err = count_votes(d, vote);
     free(vote);
@@ -288,8 +288,8 @@ static pal_err run_method(decision *d, pal_voxel_method method, bool *open)
 {
     bool any = method == PAL_VOXELS_CHOOSE;
     pal_crossings rows;
-    double volume = fabs(pal_surface_volume(d->surface));
-    d->report->surface_volume_m3 = d->scan->closed && isfinite(volume) ? volume : 0;
+    const double volume = d->scan->closed ? fabs(pal_surface_volume(d->surface)) : 0;
+    d->report->surface_volume_m3 = isfinite(volume) ? volume : 0;
     if (d->scan->closed && (any || method == PAL_VOXELS_SCANLINE)) {
         PAL_TRY(pal_scan_axis(d->scan, d->grid->n, 0, &rows));
         bool plain = pal_scan_plain(&rows, d->inside);
@@ -298,7 +298,6 @@ static pal_err run_method(decision *d, pal_voxel_method method, bool *open)
         if (plain) return PAL_ERR_OK;
         memset(d->inside->word, 0, pal_bits_words(d->inside) * sizeof *d->inside->word);
     }
-    PAL_TRY(pal_scan_drop_copies(d->scan));
     PAL_TRY(pal_parts_find(d->scan, &d->parts));
     pal_err err;
     bool even = d->scan->even;

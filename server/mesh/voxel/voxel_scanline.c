@@ -21,7 +21,7 @@ static const int ACROSS[3][2] = {{1, 2}, {0, 2}, {0, 1}};
 
 void pal_scan_surface_free(pal_scan_surface *scan)
 {
-    PAL_FREE(scan->point, scan->tri, scan->part, scan->hash);
+    PAL_FREE(scan->point, scan->tri, scan->part, scan->hash, scan->near);
     memset(scan, 0, sizeof *scan);
 }
 
@@ -202,13 +202,44 @@ static void narrow(const edge_rule *e, int64_t *from, int64_t *to)
     }
 }
 
+/* voxels whose centres lie below a coordinate, and at or below it */
+static inline int32_t centres_below(int32_t at)
+{
+    return (at - PAL_SCAN_HALF + PAL_SCAN_ONE - 1) >> 16;
+}
+static inline int32_t last_centre(int32_t at)
+{
+    return (at - PAL_SCAN_HALF) >> 16;
+}
+
+pal_err pal_scan_find_near(pal_scan_surface *scan)
+{
+    pal_err err = PAL_ERR_OK;
+    PAL_ARRAY(&err, scan->near, scan->n_tri);
+    if (err) return err;
+    scan->n_near = 0;
+    for (int32_t t = 0; t < scan->n_tri; t++) {
+        const int32_t *a = pal_scan_corner(scan, (size_t)t, 0), *b = pal_scan_corner(scan, (size_t)t, 1),
+                      *c = pal_scan_corner(scan, (size_t)t, 2);
+        int n_axis = 0;
+        for (int k = 0; k < 3; k++) {
+            int32_t low = a[k] < b[k] ? a[k] : b[k], high = a[k] < b[k] ? b[k] : a[k];
+            low = c[k] < low ? c[k] : low, high = c[k] > high ? c[k] : high;
+            n_axis += centres_below(low) <= last_centre(high);
+        }
+        scan->near[scan->n_near] = t;
+        scan->n_near += n_axis >= 2;
+    }
+    return PAL_ERR_OK;
+}
+
 /* first and last centre within the range of three coordinates, within 0..n-1 */
 static bool centre_range(int32_t a, int32_t b, int32_t c, int n, int *from, int *to)
 {
     int32_t sorted[3];
     pal_sort3(sorted, (const int32_t[3]){a, b, c});
-    *from = (sorted[0] - PAL_SCAN_HALF + PAL_SCAN_ONE - 1) >> 16;
-    *to = (sorted[2] - PAL_SCAN_HALF) >> 16;
+    *from = centres_below(sorted[0]);
+    *to = last_centre(sorted[2]);
     if (*from < 0) *from = 0;
     if (*to > n - 1) *to = n - 1;
     return *from <= *to;
@@ -296,9 +327,12 @@ pal_err pal_scan_axis(const pal_scan_surface *scan, const int n[3], int axis, pa
     scanner s = {.n_p = n[ACROSS[axis][0]], .n_q = n[ACROSS[axis][1]], .n_place = n[axis], .axis = axis};
     s.max = (int64_t)CROSSINGS_PER_ROW * s.n_p * s.n_q + (int64_t)CROSSINGS_PER_TRI * scan->n_tri + 4096;
     bool ok = true;
-    for (size_t t = 0; ok && t < (size_t)scan->n_tri; t++)
+    const int n_near = scan->near ? scan->n_near : scan->n_tri;
+    for (int i = 0; ok && i < n_near; i++) {
+        const size_t t = (size_t)(scan->near ? scan->near[i] : i);
         ok = scan_triangle(&s, pal_scan_corner(scan, t, 0), pal_scan_corner(scan, t, 1), pal_scan_corner(scan, t, 2),
                            scan->part ? scan->part[t] : 0);
+    }
     pal_err err = ok ? sort_rows(&s, out) : s.n == s.max ? PAL_ERR_BUDGET : PAL_ERR_MEMORY;
     return PAL_FREED(err, s.item);
 }

@@ -14,8 +14,10 @@ typedef struct pal_scan_surface {
     int32_t *tri;   /* [n_tri][3]                                            */
     int32_t *part;  /* part of each triangle [n_tri], or NULL: all part 0    */
     uint64_t *hash; /* of each vertex by its position [n_vertex]             */
-    bool closed;    /* as a chain: every edge runs equally often both ways   */
-    bool even;      /* every edge has an even number of triangles            */
+    int32_t *near;  /* the triangles that rows may cross [n_near], or NULL: all (pal_scan_find_near) */
+    int n_near;
+    bool closed; /* as a chain: every edge runs equally often both ways   */
+    bool even;   /* every edge has an even number of triangles            */
 } pal_scan_surface;
 
 pal_err pal_scan_snap(const pal_surface *surface, const double low[3], double h, pal_scan_surface *out); /* MEMORY */
@@ -23,6 +25,10 @@ void pal_scan_surface_free(pal_scan_surface *scan);
 /* Keeps one of each set of triangles with the same three corner positions, in either orientation, unless the surface is
  * even with them and not without (two copies that close a fin); updates closed and even; MEMORY */
 pal_err pal_scan_drop_copies(pal_scan_surface *scan);
+
+/* lists the triangles whose box holds voxel centres along two axes: the others cross no row, so that where triangles
+ * are small beside voxels a scan of each axis looks at few; MEMORY */
+pal_err pal_scan_find_near(pal_scan_surface *scan);
 
 /* corner k of a triangle; corner 3 is corner 0 again */
 static inline const int32_t *pal_scan_corner(const pal_scan_surface *scan, size_t tri, int k)
