@@ -84,6 +84,8 @@ static pal_err make_scene(pal_estimation *w, const pal_scene *scene, int body, p
     *w->scene = *scene;
     w->scene->n_body = 1;
     w->scene->n_tool = 0;
+    /* estimates are made beside the steps of the session, whose threads need the cores */
+    w->scene->threads = 1;
     pal_body_def *def = &w->scene->body[0];
     if (body > 0) *def = scene->body[body];
     w->skinned = !strcmp(def->output.name, "skin_output");

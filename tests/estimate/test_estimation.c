@@ -8,6 +8,7 @@
 #include "server/sim/springs/spring_law.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
+#include "tests/fixtures/count_threads.h"
 #include "tests/fixtures/estimate_scene.h"
 #include "tests/session/sculpt_body.h"
 
@@ -96,6 +97,48 @@ static void the_part_of_time_is_what_shorter_steps_change(void)
         pal_world_destroy(w);
         free(fem);
     }
+}
+
+/* springs as they push off, swing and come to rest, by sub-steps of half of their limit and of nine tenths */
+static void the_part_of_time_of_springs_is_what_much_shorter_steps_change(void)
+{
+    for (int k = 0; k < 6; k++) {
+        pal_scene *springs = malloc(sizeof *springs);
+        REQUIRE(springs);
+        *springs = scene;
+        springs->step_s = 1.0 / 60;
+        pal_entry_init(&springs->body[0].solver, "solver", "verlet");
+        pal_entry_put_number(&springs->body[0].solver, "safety", k % 2 ? 0.9 : 0.5, NULL);
+        pal_world *w = swinging(springs, 1 + 4 * (k / 2));
+        pal_estimate e;
+        REQUIRE(estimate_of(springs, w, &e));
+        const double true_m = apart(six_steps(springs, w, 1, 0), six_steps(springs, w, 16 * pal_world_substeps(w), 0));
+        printf("  %d sub-steps: true %.3g mm, estimate %.3g mm: %.2f\n", pal_world_substeps(w), 1e3 * true_m,
+               1e3 * e.time_m, e.time_m / true_m);
+        CHECK(e.time_m >= 0.5 * true_m && e.time_m <= 2 * true_m);
+        CHECK(e.algebraic_m == 0);
+        pal_world_destroy(w);
+        free(springs);
+    }
+}
+
+/* the session's threads need the cores */
+static void estimates_of_a_session_with_threads_start_none(void)
+{
+    pal_estimation *work = NULL;
+    pal_scene *two = malloc(sizeof *two);
+    REQUIRE(two);
+    *two = scene;
+    two->threads = 2;
+    const int n = count_threads();
+    pal_world *w = swinging(two, 2);
+    const int n_with = count_threads();
+    REQUIRE(!pal_estimation_open(two, 0, NULL, NULL, &work));
+    CHECK(n < 0 || n_with == n + 1);
+    CHECK_INT(count_threads(), n_with);
+    pal_estimation_close(work);
+    pal_world_destroy(w);
+    free(two);
 }
 
 /* steps without an algebraic error are solved to a share of the live tolerance: what that is off by */
@@ -659,6 +702,8 @@ int main(void)
 {
     if (!estimate_scene(8)) return 1;
     RUN_LONG(the_part_of_time_is_what_shorter_steps_change);
+    RUN(estimates_of_a_session_with_threads_start_none);
+    RUN_LONG(the_part_of_time_of_springs_is_what_much_shorter_steps_change);
     RUN_LONG(steps_without_an_algebraic_error_are_exact_enough);
     RUN_LONG(a_looser_solver_leaves_more);
     RUN(the_error_of_force_is_what_finer_meshes_change);

@@ -4,11 +4,11 @@
 #include "server/num/incomplete_cholesky.h"
 #include "server/num/shape_functions.h"
 #include "tests/check.h"
+#include "tests/fixtures/count_threads.h"
 #include "tests/fixtures/hex_stiffness.h"
 #include "tests/fixtures/random.h"
 
 #include <SuiteSparse_config.h>
-#include <dirent.h>
 #include <float.h>
 #include <signal.h>
 
@@ -460,16 +460,6 @@ static void keeps_the_old_factor_when_a_refresh_fails(void)
     pal_cholesky_destroy(c);
     free(b), free(x), free(old);
     pal_arena_destroy(g.arena);
-}
-
-static int count_threads(void)
-{
-    int n = 0;
-    DIR *tasks = opendir("/proc/self/task");
-    if (!tasks) return -1;
-    for (const struct dirent *d; (d = readdir(tasks));) n += d->d_name[0] != '.';
-    closedir(tasks);
-    return n;
 }
 
 static void factors_on_the_threads_it_was_called_on(void)
