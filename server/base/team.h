@@ -20,8 +20,9 @@ int pal_team_size(const pal_team *team); /* workers, the caller among them */
  * on return. A piece must not run the same team. n <= 0: nothing; team NULL: the caller does all */
 void pal_team_run(pal_team *team, int n, void (*piece)(void *user, int worker, int index), void *user);
 /* While a team is held, workers without work watch for the next run instead of sleeping, so that pieces of ten
- * microseconds pay. They yield to other threads of the same core, but take what is left of it: hold a team for a step
- * at most. NULL: nothing */
+ * microseconds pay, and where there is a worker for each piece, piece i is worker i's unless it does not come. They
+ * yield to other threads of the same core, but take what is left of it: hold a team for a step at most. NULL: nothing
+ */
 void pal_team_hold(pal_team *team);
 void pal_team_release(pal_team *team);
 #endif
