@@ -132,8 +132,10 @@ static void velocity_of_a_new_node_is_the_mean_of_its_edge(void)
     shake(&t, 3);
     for (int32_t f = 0; f < 224; f += 5) pal_adaptive_split(t.adaptive, &t.body, f, 0);
     pal_adaptive_update(t.adaptive, &t.body);
-    for (int k = 114; k < t.body.n_active; k++) {
-        const int32_t v = t.body.active[k], *end = l->edge[pal_levels_vertex_parent(l, v)].vertex;
+    for (int k = 0; k < t.body.n_active; k++) {
+        const int32_t v = t.body.active[k];
+        if (v < l->n_vertex[0]) continue;
+        const int32_t *end = l->edge[pal_levels_vertex_parent(l, v)].vertex;
         for (int c = 0; c < 3; c++)
             CHECK_NEAR(t.body.v[3 * v + c], 0.5 * (t.body.v[3 * end[0] + c] + t.body.v[3 * end[1] + c]), 1e-16);
         /* and within the edge's own length of its middle */
