@@ -72,6 +72,18 @@ double pal_dot_product(int n, const double *a, const double *b)
     return product(NULL, n, a, b);
 }
 
+/* z ~ A^-1 r; returns z'r */
+static double precondition(pal_conjugate_gradient *cg)
+{
+    double rz = 0;
+    for (int k = 0; k < 2 && !(rz > 0); k++) {
+        cg->careful = k > 0;
+        cg->precondition(cg->user, cg->r, cg->z);
+        rz = product(cg->team, cg->n, cg->r, cg->z);
+    }
+    return rz;
+}
+
 int pal_conjugate_gradient_run(pal_conjugate_gradient *cg, double *x, double target, int min, int max)
 {
     const int n = cg->n;
@@ -79,8 +91,7 @@ int pal_conjugate_gradient_run(pal_conjugate_gradient *cg, double *x, double tar
     pass p = {.n = n, .cg = cg, .x = x};
     cg->n_done = 0;
     while (cg->n_done < max && rr > 0 && (cg->n_done < min || rr > target * target)) {
-        cg->precondition(cg->user, cg->r, cg->z);
-        double rz = product(cg->team, n, cg->r, cg->z);
+        const double rz = precondition(cg);
         if (!(rz > 0) || !isfinite(rz) || (cg->n_done >= min && rz <= cg->gain * cg->energy)) break;
         /* z'(r - r of before) / (z'r of before), and r of before is r + alpha q */
         p.beta = cg->n_done > 0 ? -p.alpha * product(cg->team, n, cg->z, cg->q) / rz_old : 0;

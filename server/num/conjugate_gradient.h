@@ -5,6 +5,8 @@
 #define PAL_NUM_CONJUGATE_GRADIENT_H
 #include "server/base/team.h"
 
+#include <stdbool.h>
+
 typedef struct pal_conjugate_gradient {
     int n;                                                          /* unknowns */
     void (*multiply)(void *user, const double *p, double *out);     /* out = A p                      */
@@ -19,10 +21,14 @@ typedef struct pal_conjugate_gradient {
     double gain, energy;
     double residual; /* out: |r|, Euclidean                                     */
     int n_done;      /* out: iterations so far, while it runs too               */
+    /* out, for precondition: its answer to this r was no descent, z'r <= 0; it is asked once more, for one that is
+     * surely symmetric and positive definite */
+    bool careful;
 } pal_conjugate_gradient;
 
 /* Improves x until |r| <= target, with at least `min` (unless r = 0) and at most `max` iterations; stops where a number
- * is not finite or a direction has no positive curvature. Returns the number of iterations. */
+ * is not finite, a direction has no positive curvature, or a careful answer is no descent either. Returns the number of
+ * iterations. */
 int pal_conjugate_gradient_run(pal_conjugate_gradient *cg, double *x, double target, int min, int max);
 
 /* dot product of n numbers in a fixed order, 8 partial sums in each of chunks of 16,384 numbers: the same bits on every

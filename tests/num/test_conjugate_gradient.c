@@ -8,8 +8,9 @@ enum { N = 60 };
 
 typedef struct chain {
     double diagonal[N]; /* of the matrix whose neighbours are coupled by -1 */
-    int kind;           /* of the preconditioner: 0 none, 1 diagonal, 2 diagonal with 1e-4 noise, 3 NaN */
+    int kind;           /* of the preconditioner: 0 none, 1 diagonal, 2 diagonal with 1e-4 noise, 3 NaN, 4 uphill */
     int n_multiply, n_precondition;
+    const pal_conjugate_gradient *cg; /* NULL: no answer is careful */
 } chain;
 
 static void multiply(void *user, const double *p, double *out)
@@ -27,6 +28,7 @@ static void precondition(void *user, const double *r, double *out)
         out[i] = c->kind ? r[i] / c->diagonal[i] : r[i];
         if (c->kind == 2) out[i] *= 1 + 1e-4 * sin(12.9898 * i + 78.233 * c->n_precondition);
         if (c->kind == 3) out[i] = NAN;
+        if (c->kind == 4 && !(c->cg && c->cg->careful)) out[i] *= -1;
     }
 }
 
@@ -115,6 +117,30 @@ static void stops_where_there_is_no_way_down(void)
     CHECK_NEAR(cg.residual, 0, 0);
 }
 
+/* an answer that leads uphill, as of a cycle that is not symmetric, is asked for again and ends nothing */
+static void asks_again_where_an_answer_leads_uphill(void)
+{
+    double r[N], z[N], p[N], q[N];
+    for (int kind = 1; kind <= 4; kind += 3) {
+        chain c;
+        double x[N] = {0};
+        make(&c, 2, kind);
+        pal_conjugate_gradient cg = {
+            .n = N, .multiply = multiply, .precondition = precondition, .user = &c, .r = r, .z = z, .p = p, .q = q};
+        c.cg = &cg;
+        for (int i = 0; i < N; i++) r[i] = 1 + i % 5;
+        const int n = pal_conjugate_gradient_run(&cg, x, 1e-9, 0, 200);
+        CHECK_LE(cg.residual, 1e-9);
+        CHECK_INT(c.n_precondition, kind == 4 ? 2 * n : n);
+        CHECK(!cg.careful || kind == 4);
+    }
+    double error, residual;
+    chain c;
+    make(&c, 2, 4);
+    CHECK_INT(solve(&c, 1e-9, 0, 50, &error, &residual), 0);
+    CHECK_INT(c.n_precondition, 2);
+}
+
 /* the search for x'b ends at a share of it, from no guess and from a good one */
 static void ends_once_the_energy_is_known(void)
 {
@@ -158,6 +184,7 @@ int main(void)
     RUN(gains_from_the_preconditioner);
     RUN(keeps_to_its_budget_and_to_the_least);
     RUN(stops_where_there_is_no_way_down);
+    RUN(asks_again_where_an_answer_leads_uphill);
     RUN(ends_once_the_energy_is_known);
     RUN(sums_in_a_fixed_order);
     return check_report();

@@ -36,6 +36,7 @@ typedef struct pal_grasp {
     bool closed, button; /* has tissue; button in the last step      */
     bool by_vertex;      /* share is that of the tissue              */
     int n_node;
+    uint64_t revision;            /* of nodes and weights                                 */
     int32_t *node;                /* [n_node]                                             */
     double *weight;               /* sum 1 [n_node]                                       */
     uint16_t *share;              /* of each shown vertex, UINT16_MAX: 1        [n_shown] */
@@ -62,12 +63,14 @@ struct pal_grasps {
     double asked_N_m, damping_s, asked_reach_m; /* keys */
     double young_Pa, poisson;
     uint64_t revision; /* adaptive bodies: of the nodes that are held */
+    uint64_t n_taken;  /* how often a grasp took nodes */
 };
 
 void pal_grasp_act_explicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *tool, pal_step *step);
 void pal_grasp_act_implicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *tool, pal_step *step);
 /* pal_tangent of the implicit regime */
 void pal_grasp_multiply(void *self, const pal_body *body, double k, const double *p, double *out);
+int pal_grasp_mean_springs(const void *self, pal_mean_spring *out, int max);
 bool pal_grasp_settle(void *self, pal_step *step, const double *moved, bool last);
 
 /* ---- for the regimes ---- */

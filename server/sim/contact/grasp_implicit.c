@@ -34,13 +34,35 @@ void pal_grasp_act_implicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *to
     pal_grasp_add_force(g, implicit->load, body->load);
 }
 
+/* a spring, and no constant force, in this sub-step */
+static bool is_spring(const pal_grasp *g)
+{
+    return g->closed && g->implicit->pulls && !g->implicit->constant;
+}
+
+int pal_grasp_mean_springs(const void *self, pal_mean_spring *out, int max)
+{
+    const pal_grasps *grasps = self;
+    int n = 0;
+    for (int t = 0; t < grasps->n_tool && n < max; t++) {
+        const pal_grasp *g = &grasps->grasp[t];
+        if (is_spring(g))
+            out[n++] = (pal_mean_spring){.k_N_m = g->implicit->k_N_m,
+                                         .n_node = g->n_node,
+                                         .node = g->node,
+                                         .weight = g->weight,
+                                         .revision = g->revision};
+    }
+    return n;
+}
+
 void pal_grasp_multiply(void *self, const pal_body *body, double k, const double *p, double *out)
 {
     const pal_grasps *grasps = self;
     (void)body;
     for (int t = 0; t < grasps->n_tool; t++) {
         const pal_grasp *g = &grasps->grasp[t];
-        if (!g->closed || !g->implicit->pulls || g->implicit->constant) continue;
+        if (!is_spring(g)) continue;
         double mean[3];
         pal_grasp_mean(g, p, mean);
         pal_scale3(mean, k * g->implicit->k_N_m, mean);

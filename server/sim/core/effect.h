@@ -60,6 +60,16 @@ typedef struct pal_build {
     int n_made;
 } pal_build;
 
+/* A spring between a tool and the weighted mean of nodes, the same along each axis: K = k w w', with a weight for each
+ * of its nodes */
+typedef struct pal_mean_spring {
+    double k_N_m;
+    int n_node;
+    const int32_t *node;  /* [n_node] */
+    const double *weight; /* sum 1 [n_node] */
+    uint64_t revision;    /* never 0; another one with other nodes or weights */
+} pal_mean_spring;
+
 /* What implicit solvers ask of FORCE and CONTACT components: the stiffness K = -df/dx, symmetric, evaluated by
  * `linearise` and constant until the next one, positive semi-definite or made so. FORCE components have multiply; every
  * other member may be NULL. [sim] unless stated */
@@ -84,6 +94,9 @@ typedef struct pal_tangent {
      * that its loads in body->load and its stiffness have changed: the solver solves the sub-step again from where it
      * began. A component asks for that a bounded number of times */
     bool (*settle)(void *self, pal_step *step, const double *moved, bool last);
+    /* CONTACT: the springs of this sub-step that hold the mean of nodes, at most `max`, whose arrays last as long as
+     * it; returns their number. NULL: never one */
+    int (*mean_springs)(const void *self, pal_mean_spring *out, int max);
     /* voxel hexahedra that are all of the component but its recovery, for preconditioners in single precision; NULL:
      * it has other elements. [load] */
     const struct pal_elastic_hexes *(*cubes)(const void *self);

@@ -158,6 +158,7 @@ static void take_gathered(pal_grasps *grasps, pal_grasp *g, const pal_body *body
 {
     double sum = 0;
     g->n_node = 0;
+    g->revision = ++grasps->n_taken;
     for (int k = 0; k < pal_body_nodes(body); k++) {
         int i = pal_body_point(body, k);
         if (grasps->gather[i] == 0) continue;
@@ -339,7 +340,8 @@ static double reach_m(const void *self, const pal_tool *tool)
     return 1.5 * pal_grasp_reach_m(grasps, tool);
 }
 
-static const pal_tangent tangent = {.multiply = pal_grasp_multiply, .settle = pal_grasp_settle};
+static const pal_tangent tangent = {
+    .multiply = pal_grasp_multiply, .settle = pal_grasp_settle, .mean_springs = pal_grasp_mean_springs};
 
 const pal_effect pal_effect_tool_grasp = {
     PAL_EFFECT("tool_grasp", CONTACT), .material = material, .reset = reset, .transfer = transfer, .destroy = destroy,

@@ -18,7 +18,7 @@ static void multiply(void *user, const double *p, double *out)
 static void precondition(void *user, const double *r, double *z)
 {
     pal_compliance_solver *solver = user;
-    const pal_cycle cycle = pal_preconditioner_cycle(solver->system, solver->cg.n_done);
+    const pal_cycle cycle = pal_preconditioner_cycle(solver->system, &solver->cg);
     pal_preconditioner_solve(&solver->preconditioner, cycle, r, z);
 }
 

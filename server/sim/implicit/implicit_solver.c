@@ -49,8 +49,11 @@ static void multiply(void *user, const double *p, double *out)
 static void precondition(void *user, const double *r, double *z)
 {
     pal_implicit *core = user;
-    const pal_cycle cycle = pal_preconditioner_cycle(&core->system, core->cg.n_done);
-    pal_preconditioner_solve(&core->preconditioner, cycle, r, z);
+    const pal_cycle cycle = pal_preconditioner_cycle(&core->system, &core->cg);
+    if (core->system.has_contact)
+        pal_woodbury_solve(&core->woodbury, &core->preconditioner, cycle, r, z);
+    else
+        pal_preconditioner_solve(&core->preconditioner, cycle, r, z);
 }
 
 static pal_err make_arrays(pal_implicit *core, pal_arena *arena)
@@ -109,6 +112,7 @@ pal_err pal_implicit_make(pal_config_entry *item, pal_build *build, double share
     const pal_preconditioner_options options = {.kind = core->options.preconditioner, .single = true};
     PAL_TRY(pal_preconditioner_make(&options, &core->system, &core->rotations, build->arena, build->diag,
                                     &core->preconditioner));
+    PAL_TRY(pal_woodbury_make(&core->system, build->made, build->n_made, build->arena, &core->woodbury));
     pal_err err = factor_at_rest(core);
     if (!err) err = pal_compliance_solver_make(&core->preconditioner, &core->cg, build->arena, &core->compliance);
     if (err == PAL_ERR_NUMERIC)
@@ -222,6 +226,10 @@ static void solve_linear(pal_implicit *core, double target)
     for (int i = 0; i < body->n_dof; i++)
         prescribed_moves = prescribed_moves || (body->support[i] && pal_dot3(p + 3 * i, p + 3 * i) > 0);
     double before = norm(core, r);
+    if (core->system.has_contact) {
+        pal_woodbury_guess(&core->woodbury, r, p);
+        for (int i = 0; i < core->cg.n; i++) v[i] = core->start[i] + p[i];
+    }
     pal_system_multiply(&core->system, p, q);
     for (int i = 0; i < core->cg.n; i++) r[i] -= q[i];
     /* a guess that is worse than none */
@@ -344,6 +352,7 @@ static void iterate(pal_implicit *core, double tau, double target)
 {
     pal_node_rotations_update(&core->rotations, &core->system);
     pal_preconditioner_rotate(&core->preconditioner);
+    if (core->system.has_contact) pal_woodbury_update(&core->woodbury, &core->preconditioner, core->cg.z);
     memcpy(core->moved, core->cg.r, pal_body_bytes3(core->system.body));
     solve_linear(core, target);
     keep_momentum(core);
@@ -463,13 +472,11 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
 
 /* ---- a sub-step ---- */
 
-/* rows of contact that touch nothing answer no motion, so neither this one, which none of their directions is across.
- * Where something holds the body it does not matter: what they do not add costs nothing to leave in */
+/* rows of contact that touch nothing answer no motion, so neither this one, which none of their directions is across */
 static bool contact_acts(pal_implicit *core)
 {
     double *p = core->cg.p, *q = core->cg.q;
-    if (core->system.n_free < core->system.body->n_dof) return true;
-    for (int i = 0; i < core->cg.n; i++) p[i] = (const double[]){1, M_SQRT2, M_PI}[i % 3];
+    for (int i = 0; i < core->cg.n; i += 3) p[i] = 1, p[i + 1] = M_SQRT2, p[i + 2] = M_PI;
     memset(q, 0, pal_body_bytes3(core->system.body));
     pal_system_multiply_contact(&core->system, 1, p, q);
     for (int i = 0; i < core->cg.n; i++)
@@ -555,6 +562,7 @@ void pal_implicit_end(pal_implicit *core, pal_step *step)
     core->rose_s = core->energy_rose ? PAL_PAUSE_S : fmax(0, core->rose_s - step->dt_s);
     pal_body_update_nodes(body);
     pal_preconditioner_step(&core->preconditioner, step->dt_s);
+    pal_woodbury_step(&core->woodbury, step->dt_s);
     if (core->compliance.hook.solve) {
         pal_preconditioner_step(&core->compliance.preconditioner, step->dt_s);
         pal_preconditioner_rotate(&core->compliance.preconditioner);
@@ -607,6 +615,7 @@ void pal_implicit_reset(void *self, const pal_body *body)
     core->rose_s = 0;
     if (core->system.n_free == 0) return;
     pal_node_rotations_reset(&core->rotations);
+    pal_woodbury_reset(&core->woodbury);
     pal_compliance_solver_reset(&core->compliance);
     if (core->compliance.hook.solve) pal_preconditioner_rotate(&core->compliance.preconditioner);
     /* the same factor as at load, so that a run repeats; without memory for it the present one still serves */

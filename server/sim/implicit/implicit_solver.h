@@ -22,6 +22,7 @@
 #ifndef PAL_SIM_IMPLICIT_IMPLICIT_SOLVER_H
 #define PAL_SIM_IMPLICIT_IMPLICIT_SOLVER_H
 #include "server/sim/implicit/compliance.h"
+#include "server/sim/implicit/woodbury.h"
 
 /* keys of both solvers, with their defaults */
 typedef struct pal_implicit_options {
@@ -41,6 +42,7 @@ typedef struct pal_implicit {
     pal_system system;
     pal_node_rotations rotations;
     pal_preconditioner preconditioner;
+    pal_woodbury woodbury;            /* what it does not know of contact */
     pal_compliance_solver compliance; /* compliance.hook.solve NULL: not wanted or not available */
     pal_conjugate_gradient cg;
     double *x0, *v0; /* at the beginning of the sub-step [n_dof][3] */

@@ -13,6 +13,7 @@
 #ifndef PAL_SIM_IMPLICIT_PRECONDITIONER_H
 #define PAL_SIM_IMPLICIT_PRECONDITIONER_H
 #include "server/num/cholesky.h"
+#include "server/num/conjugate_gradient.h"
 #include "server/num/incomplete_cholesky.h"
 #include "server/sim/implicit/hex_multigrid.h"
 
@@ -72,12 +73,11 @@ void pal_preconditioner_set_rest(pal_preconditioner *p);
 void pal_preconditioner_rotate(pal_preconditioner *p); /* to the present rotations */
 /* z ~ A^-1 r; z may be r. cycle: of multigrid; PAL_CYCLE_V where it has to be symmetric */
 void pal_preconditioner_solve(pal_preconditioner *p, pal_cycle cycle, const double *r, double *z);
-/* the cycle for an iteration of conjugate gradients, from 0. Two sawtooth cycles end most solves of bodies that nothing
- * touches; later ones, and the stiff rows of contact, which no cycle knows, leave what one that is not symmetric hardly
- * changes: under a pull it takes a tenth more iterations than the V */
-static inline pal_cycle pal_preconditioner_cycle(const pal_system *system, int iteration)
+/* the cycle for the next iteration of conjugate gradients. Two sawtooth cycles end most solves of bodies that nothing
+ * touches; later ones, and contact, which no cycle knows, leave what one that is not symmetric hardly changes */
+static inline pal_cycle pal_preconditioner_cycle(const pal_system *system, const pal_conjugate_gradient *cg)
 {
-    return iteration < 2 && !system->has_contact ? PAL_CYCLE_SAWTOOTH : PAL_CYCLE_V;
+    return cg->n_done < 2 && !system->has_contact && !cg->careful ? PAL_CYCLE_SAWTOOTH : PAL_CYCLE_V;
 }
 
 /* true: a refresh may start; false: one is in progress or was recently */

@@ -128,7 +128,7 @@ static void multiply_true(void *user, const double *p, double *out)
 static void precondition(void *user, const double *r, double *z)
 {
     static_newton *solver = user;
-    const pal_cycle cycle = pal_preconditioner_cycle(&solver->system, solver->cg.n_done);
+    const pal_cycle cycle = pal_preconditioner_cycle(&solver->system, &solver->cg);
     pal_preconditioner_solve(&solver->preconditioner, cycle, r, z);
 }
 

@@ -428,6 +428,20 @@ static void check_cycles(pal_preconditioner *p, double *work, int turn)
     }
 }
 
+/* sawteeth for the first two iterations of a body that nothing touches, unless one was no descent */
+static void the_cycle_follows_the_iteration(void)
+{
+    const pal_system free_system = {.has_contact = false}, touched = {.has_contact = true};
+    for (int n_done = 0; n_done < 4; n_done++) {
+        pal_conjugate_gradient cg = {.n_done = n_done};
+        const bool first = n_done < 2;
+        CHECK_INT(pal_preconditioner_cycle(&free_system, &cg), first ? PAL_CYCLE_SAWTOOTH : PAL_CYCLE_V);
+        CHECK_INT(pal_preconditioner_cycle(&touched, &cg), PAL_CYCLE_V);
+        cg.careful = true;
+        CHECK_INT(pal_preconditioner_cycle(&free_system, &cg), PAL_CYCLE_V);
+    }
+}
+
 /* A multigrid preconditioner beside that of the world's solver, of the same component */
 typedef struct beside {
     pal_arena *arena;
@@ -707,6 +721,7 @@ int main(void)
     RUN(an_edit_drops_levels_in_the_making);
     RUN(threads_do_not_change_a_bit);
     RUN(an_application_is_symmetric_and_positive);
+    RUN(the_cycle_follows_the_iteration);
     RUN(an_update_is_that_of_the_whole_body_to_the_bit);
     RUN(an_update_takes_all_that_has_changed);
     RUN(the_choice_follows_size_and_elements);
