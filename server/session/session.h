@@ -165,8 +165,8 @@ pal_err pal_session_command(pal_session *session, const pal_command *command);
 const pal_frame *pal_session_take_frame(pal_session *session);
 /* Adds (true) or removes an observer of frames. Counts only with the option only_observed, which begins with none:
  * displayed surfaces, skins above all, are then not computed, and frames repeat the last positions (n_output of a part
- * does not grow). The first observer gets an up-to-date frame within a step, paused or not. true: it is the first, so
- * that the newest frame until then shows an old shape. [any] */
+ * does not grow). The first observer gets an up-to-date frame within a step, paused, at rest or not. true: it is the
+ * first, so that the newest frame until then shows an old shape. [any] */
 bool pal_session_observe(pal_session *session, bool observes);
 /* did the thread tick within the last second, or is it paused? for /healthz [any] */
 bool pal_session_is_alive(const pal_session *session);

@@ -1,6 +1,7 @@
 /* The simulation thread: takes commands and the newest poses, steps the world, publishes a frame, and sleeps until the
  * next absolute time. It waits for no other thread: poses and frames use triple buffers, commands a queue. The only
  * lock guards the last diagnostic, the materials and the place in a recording; an ordinary step does not take it.
+ * While all bodies sleep and nobody looks, the thread rests for several steps, which it takes together afterwards.
  *
  * Slowdown is real time over simulated time since a mark that is 1 to 1 + 1/16 s old. */
 #include "server/session/session_core.h"
@@ -300,7 +301,6 @@ static void step(pal_session *s)
     time_substep(s);
     s->end_ns = session_now_ns(s);
     s->step++;
-    mark_pace(s, s->end_ns);
     if (s->log && s->step % PAL_INPUT_HASH_STEPS == 0)
         pal_input_log_put(
             s->log, &(pal_input_record){.kind = PAL_INPUT_HASH, .step = s->step, .hash = pal_world_hash(s->world)});
@@ -316,25 +316,6 @@ static void estimate(pal_session *s, bool stepped)
     if (pal_estimator_set_step(&s->estimators, s->world, step_ms, &diag)) pal_session_put_diagnostic(s, &diag);
 }
 
-static bool is_stopped(const pal_session *s)
-{
-    return atomic_load_explicit(&s->stop, memory_order_acquire);
-}
-
-/* Waits for the due time; a step at least one whole step late is due now, and the missed ones are dropped. false: the
- * thread is to end */
-static bool pace(pal_session *s, uint64_t *due)
-{
-    const pal_clock *clock = s->options.clock;
-    uint64_t now = session_now_ns(s);
-    const uint64_t step_ns = s->play ? (uint64_t)((double)s->step_ns / s->speed) : s->step_ns;
-    *due = s->options.unpaced && !s->paused ? now : *due + step_ns;
-    for (; now < *due && !is_stopped(s); now = session_now_ns(s)) clock->sleep_until_ns(clock->user, *due);
-    if (!s->paused && now > *due + (uint64_t)(PAL_LATE_PART * (double)s->step_ns)) s->n_late++;
-    if (now > *due + s->step_ns) *due = now;
-    return !is_stopped(s);
-}
-
 static void *simulate(void *user)
 {
     pal_session *s = user;
@@ -342,7 +323,9 @@ static void *simulate(void *user)
     s->end_ns = due;
     update_observed(s);
     publish(s);
-    while (pace(s, &due)) {
+    for (int n; (n = pal_session_pace(s, &due)) > 0;) {
+        /* those of a rest, in which nothing came */
+        for (int k = 1; k < n; k++) step(s);
         bool changed = take_commands(s);
         uint64_t now = session_now_ns(s);
         atomic_store_explicit(&s->beat_ns, now, memory_order_relaxed);
@@ -351,6 +334,7 @@ static void *simulate(void *user)
         bool moves = (!s->paused || s->single > 0) && (!s->play || s->playing.state == PAL_PLAYS);
         if (moves) {
             step(s);
+            mark_pace(s, s->end_ns);
             s->play_step++;
             if (s->single > 0) s->single--;
             changed = true;
@@ -451,7 +435,7 @@ pal_err pal_session_start(pal_session *s, pal_diagnostic *diag)
 void pal_session_stop(pal_session *s)
 {
     atomic_store_explicit(&s->stop, true, memory_order_release);
-    pal_clock_wake(s->options.clock);
+    pal_session_call(s);
     if (s->running) pthread_join(s->thread, NULL);
     s->running = false;
 }
@@ -463,6 +447,7 @@ static void release(pal_session *s)
     pal_world_destroy(s->world);
     pal_estimator_set_close(&s->estimators);
     pthread_mutex_destroy(&s->lock);
+    pthread_cond_destroy(&s->call);
     free((void *)(uintptr_t)s->options.record_path);
     free(s->outline.component);
     free(s);
@@ -473,7 +458,12 @@ pal_err pal_session_open(const pal_scene *scene, const pal_session_options *opti
 {
     pal_session *s = calloc(1, sizeof *s);
     if (!s) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a session");
+    pthread_condattr_t monotonic;
     pthread_mutex_init(&s->lock, NULL);
+    pthread_condattr_init(&monotonic);
+    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
+    pthread_cond_init(&s->call, &monotonic);
+    pthread_condattr_destroy(&monotonic);
     s->scene = scene;
     s->predicted_ms = NAN;
     if (options) s->options = *options;
@@ -591,6 +581,7 @@ pal_err pal_session_request_pose(pal_session *s, int tool, const pal_pose *pose)
     if (pose) slot->pose = *pose;
     slot->arrived_ns = session_now_ns(s);
     pal_triple_buffer_publish(&s->tool[tool].triple_buffer);
+    if (atomic_load(&s->rests)) pal_session_call(s);
     return PAL_ERR_OK;
 }
 
@@ -620,7 +611,9 @@ static bool is_valid(const pal_session *s, const pal_command *command)
 pal_err pal_session_command(pal_session *s, const pal_command *command)
 {
     if (!is_valid(s, command)) return refuse(s);
-    return pal_command_queue_put(s->command, command);
+    const pal_err err = pal_command_queue_put(s->command, command);
+    if (atomic_load(&s->rests)) pal_session_call(s);
+    return err;
 }
 
 bool pal_session_estimate(pal_session *s, int body, pal_estimate *out)
@@ -635,7 +628,8 @@ const pal_frame *pal_session_take_frame(pal_session *s)
 
 bool pal_session_observe(pal_session *s, bool observes)
 {
-    const int before = atomic_fetch_add_explicit(&s->n_observer, observes ? 1 : -1, memory_order_relaxed);
+    const int before = atomic_fetch_add(&s->n_observer, observes ? 1 : -1);
+    if (atomic_load(&s->rests)) pal_session_call(s);
     return observes && before == 0 && s->options.only_observed;
 }
 

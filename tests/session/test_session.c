@@ -146,6 +146,37 @@ static void steps_follow_the_clock_and_time_is_ticks_times_step(void)
     pal_session_close(s);
 }
 
+/* of a sleeping body that nobody sees, the steps of a tenth of a second are taken together: no time is lost, and who
+ * looks, gives a pose or a command is answered at once */
+static void a_session_at_rest_wakes_ten_times_a_second(void)
+{
+    pal_scene sleeps = scene;
+    pal_body_def *def = &sleeps.body[0];
+    /* in place of gravity, so that it is at rest from the start */
+    pal_entry_init(&def->effect[0], "effects[0]", "sleep");
+    pal_session *s = stepped_open(&sleeps, (pal_session_options){.only_observed = true});
+    REQUIRE(s != NULL);
+    (void)stepped_steps(s, 400);
+    for (int turn = 0; turn < 2; turn++) {
+        const uint64_t before = stepped_clock.n_sleep, began = stepped_newest(s)->tick;
+        const pal_frame *f = stepped_steps(s, 100);
+        /* rests of 20 steps */
+        CHECK_INT(stepped_clock.n_sleep - before, turn == 0 ? 5 : 100);
+        CHECK_INT(f->tick - began, 100);
+        CHECK_NEAR(f->slowdown, 1, 1e-9);
+        CHECK_INT(f->n_late, 0);
+        if (turn == 1) break;
+        /* seven steps into a rest somebody comes */
+        f = stepped_steps(s, 7);
+        CHECK_INT(f->tick - began, 100);
+        (void)pal_session_observe(s, true);
+        manual_clock_settle(&stepped_clock, 1);
+        f = stepped_steps(s, 1);
+        CHECK_INT(f->tick - began, 108);
+    }
+    pal_session_close(s);
+}
+
 static void a_session_that_starts_paused_shows_rest_and_steps_one_by_one(void)
 {
     pal_session *s = open_with((pal_session_options){.start_paused = true});
@@ -632,6 +663,7 @@ int main(void)
     if (!small_scene(&scene, &mesh, CHECK_REPEATS(6, 4))) return 1;
     RUN(a_tool_that_jumps_is_lifted_until_it_rests);
     RUN(steps_follow_the_clock_and_time_is_ticks_times_step);
+    RUN(a_session_at_rest_wakes_ten_times_a_second);
     RUN(a_session_that_starts_paused_shows_rest_and_steps_one_by_one);
     RUN(reset_brings_the_rest_shape_back);
     RUN(the_newest_pose_wins_and_is_echoed_with_its_arrival_time);
