@@ -22,6 +22,22 @@ static void precondition(void *user, const double *r, double *z)
     pal_preconditioner_solve(&solver->preconditioner, cycle, r, z);
 }
 
+/* a'b, in eight sums side by side */
+static double dot(int n, const float *a, const double *b)
+{
+    double lane[8] = {0};
+    int i = 0;
+    for (; i + 8 <= n; i += 8)
+        for (int l = 0; l < 8; l++) lane[l] += (double)a[i + l] * b[i + l];
+    for (; i < n; i++) lane[0] += (double)a[i] * b[i];
+    return ((lane[0] + lane[4]) + (lane[2] + lane[6])) + ((lane[1] + lane[5]) + (lane[3] + lane[7]));
+}
+
+static void keep(int n, const double *from, float *to)
+{
+    for (int i = 0; i < n; i++) to[i] = (float)from[i];
+}
+
 /* the earlier answer to the force most like r; the one unused for longest when none is; *share: how much of it fits */
 static pal_compliance_entry *find_known(pal_compliance_solver *solver, double size2, double *share)
 {
@@ -31,12 +47,12 @@ static pal_compliance_entry *find_known(pal_compliance_solver *solver, double si
         pal_compliance_entry *known = &solver->known[k];
         if (known->used < oldest->used) oldest = known;
         if (known->size2 == 0) continue;
-        double dot = pal_dot_product(solver->cg.n, known->force, solver->cg.r);
-        double cosine2 = dot > 0 ? dot / known->size2 * (dot / size2) : 0;
+        const double along = dot(solver->cg.n, known->force, solver->cg.r);
+        double cosine2 = along > 0 ? along / known->size2 * (along / size2) : 0;
         if (!(cosine2 > nearest)) continue;
         nearest = cosine2;
         best = known;
-        *share = dot / known->size2;
+        *share = along / known->size2;
     }
     if (!best) *share = 0;
     return best ? best : oldest;
@@ -54,19 +70,19 @@ static bool solve_points(pal_compliance_solver *solver, const pal_body *body, do
     if (!(size2 > 0)) return size2 == 0;
     memcpy(solver->x, body->x, pal_body_bytes3(body));
     pal_compliance_entry *known = find_known(solver, size2, &share);
-    memcpy(known->force, r, pal_body_bytes3(body));
+    keep(n, r, known->force);
     known->size2 = size2;
     known->used = ++solver->n_call;
     solver->cg.energy = 0;
     if (share != 0) {
-        for (int i = 0; i < n; i++) move_m[i] = share * known->move[i];
+        for (int i = 0; i < n; i++) move_m[i] = share * (double)known->move[i];
         multiply(solver, move_m, solver->cg.q);
         for (int i = 0; i < n; i++) r[i] = body->support[i / 3] ? 0 : r[i] - solver->cg.q[i];
-        solver->cg.energy = pal_dot_product(n, known->force, move_m);
+        solver->cg.energy = dot(n, known->force, move_m);
     }
     (void)pal_conjugate_gradient_run(&solver->cg, move_m, PAL_SOLVER_TOLERANCE * sqrt(size2), share == 0,
                                      MAX_ITERATIONS);
-    memcpy(known->move, move_m, pal_body_bytes3(body));
+    keep(n, move_m, known->move);
     if (!isfinite(solver->cg.residual)) known->size2 = 0;
     return isfinite(solver->cg.residual);
 }
@@ -98,8 +114,10 @@ static pal_err make_arrays(pal_compliance_solver *solver, const pal_conjugate_gr
                 PAL_NEW_DOUBLES(arena, 3 * (size_t)body->n_node, &solver->f) &&
                 (!body->interpolation || PAL_NEW_DOUBLES(arena, n3, &solver->move));
     cg->r = of->r, cg->z = of->z, cg->p = of->p, cg->q = of->q;
-    for (int k = 0; k < PAL_COMPLIANCE_CACHE && made; k++)
-        made = PAL_NEW_DOUBLES(arena, n3, &solver->known[k].force, &solver->known[k].move);
+    for (int k = 0; k < PAL_COMPLIANCE_CACHE && made; k++) {
+        solver->known[k].force = PAL_NEW(arena, float, n3), solver->known[k].move = PAL_NEW(arena, float, n3);
+        made = solver->known[k].force && solver->known[k].move;
+    }
     cg->n = (int)n3;
     cg->gain = PAL_COMPLIANCE_GAIN;
     cg->multiply = multiply, cg->precondition = precondition, cg->user = solver;

@@ -15,9 +15,10 @@
 /* number of cached loads: one per contact patch or per axis of a grasp */
 enum { PAL_COMPLIANCE_CACHE = 4 };
 typedef struct pal_compliance_entry {
-    double *force, *move; /* at control points, N and m [n_dof][3] */
-    double size2;         /* squared norm of force; 0: empty entry */
-    uint64_t used;        /* index of the last call that used it */
+    /* at control points, N and m, as good as a guess has to be [n_dof][3] */
+    float *force, *move;
+    double size2;  /* squared norm of force; 0: empty entry */
+    uint64_t used; /* index of the last call that used it */
 } pal_compliance_entry;
 
 typedef struct pal_compliance_solver {
