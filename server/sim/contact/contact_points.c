@@ -390,6 +390,35 @@ double pal_contact_points_bound(const pal_contact_points *points, const pal_body
     return rate;
 }
 
+/* state of a slot: sums of the stiffness that moves with it, and of the one that turns with it */
+void pal_contact_points_add_bound(pal_contact_points *points, const pal_body *body, const pal_contact *contact,
+                                  double k_N_m)
+{
+    pal_contact_slot part[PAL_CONTACT_POINT_SLOTS];
+    double lever[PAL_CONTACT_POINT_SLOTS], moment[3], sum = 0;
+    const int n = pal_contact_points_slots(points, body, contact->point, part);
+    for (int k = 0; k < n; k++) {
+        pal_contact_points_use_slot(points, body, part[k].slot);
+        pal_cross3(moment, part[k].arm, contact->away);
+        lever[k] = body->display.skin && points->spin[part[k].slot].turns ? pal_norm3(moment) : 0;
+        sum += fabs(part[k].weight) + (lever[k] > 0 ? lever[k] * points->spin[part[k].slot].all : 0);
+    }
+    for (int k = 0; k < n; k++) {
+        double *state = points->state + 6 * (size_t)part[k].slot;
+        state[0] += k_N_m * sum * fabs(part[k].weight), state[1] += k_N_m * sum * lever[k];
+    }
+}
+
+void pal_contact_points_assemble_bound(const pal_contact_points *points, const pal_body *body, double *bound_N_m)
+{
+    for (int i = 0; i < points->n_slot; i++) {
+        const int slot = points->slot[i];
+        const double *state = points->state + 6 * (size_t)slot;
+        bound_N_m[pal_contact_points_slot_node(body, slot)] += state[0];
+        if (body->display.skin) pal_frame_spin_add_bound(&points->spin[slot], state[1], bound_N_m);
+    }
+}
+
 double pal_contact_points_max_eigenvalue(pal_contact_points *points, const pal_body *body, const pal_contact *contact,
                                          int n)
 {

@@ -71,6 +71,11 @@ bool pal_contact_points_nearest(const pal_contact_points *points, const pal_body
  * `away` with the free nodes, 1/s^2; two power iterations from a uniform push, which is close to its eigenvector */
 double pal_contact_points_max_eigenvalue(pal_contact_points *points, const pal_body *body, const pal_contact *contact,
                                          int n);
+/* Row sums of that matrix without M, |J_i| k sum |J_j| over the nodes j, which bound it from above: begin_slots, add
+ * every contact's with its stiffness, then to bound [n_node] */
+void pal_contact_points_add_bound(pal_contact_points *points, const pal_body *body, const pal_contact *contact,
+                                  double k_N_m);
+void pal_contact_points_assemble_bound(const pal_contact_points *points, const pal_body *body, double *bound_N_m);
 /* interpolated nodes: bound [n_node] += row sums of a point's stiffness k; returns k over its effective mass, 1/s^2 */
 double pal_contact_points_bound(const pal_contact_points *points, const pal_body *body, int point, double k_N_m,
                                 double *bound_N_m);

@@ -15,6 +15,22 @@ static void set_rotation(pal_frame_spin *t, const double X[3], double part, doub
     t->turns = true;
 }
 
+/* forces of a torque q on nodes of the fan: to_b x h and h x to_a, h = tilt' q; on the frame's node minus their sum,
+ * which is small where the fan is closed */
+static void set_bounds(pal_frame_spin *t)
+{
+    double tilt2 = 0, rest[3] = {0};
+    for (int i = 0; i < 9; i++) tilt2 += t->tilt[i] * t->tilt[i];
+    t->ring = sqrt(tilt2), t->edge = pal_norm3(t->twist), t->all = 0;
+    for (const pal_frame_face *face = t->face; face < t->face + t->n_face; face++) {
+        t->all += t->ring * (pal_norm3(face->to_a) + pal_norm3(face->to_b));
+        pal_add3(rest, rest, face->to_b);
+        pal_sub3(rest, rest, face->to_a);
+    }
+    t->own = t->ring * pal_norm3(rest) + t->edge;
+    t->all += t->own + t->edge;
+}
+
 void pal_frame_spin_find(const pal_body *body, int slot, pal_frame_face *face, pal_frame_spin *t)
 {
     const pal_skin *skin = body->display.skin;
@@ -44,6 +60,7 @@ void pal_frame_spin_find(const pal_body *body, int slot, pal_frame_face *face, p
         pal_cross3(t->Z, X, tangent);
         pal_scale3(t->Z, 1 / reach, t->Z);
         set_rotation(t, X, part, length, up / reach, reach);
+        set_bounds(t);
     }
 }
 
@@ -80,5 +97,16 @@ void pal_frame_spin_add_torque(const pal_frame_spin *t, const double torque[3], 
         pal_cross3(g, h, face->to_a);
         pal_add3(out + 3 * (size_t)face->b, out + 3 * (size_t)face->b, g);
         pal_sub3(own, own, g);
+    }
+}
+
+void pal_frame_spin_add_bound(const pal_frame_spin *t, double torque_Nm, double *out)
+{
+    if (!t->turns) return;
+    out[t->node] += torque_Nm * t->own;
+    out[t->end] += torque_Nm * t->edge;
+    for (const pal_frame_face *face = t->face; face < t->face + t->n_face; face++) {
+        out[face->a] += torque_Nm * t->ring * pal_norm3(face->to_b);
+        out[face->b] += torque_Nm * t->ring * pal_norm3(face->to_a);
     }
 }

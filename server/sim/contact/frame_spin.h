@@ -18,6 +18,9 @@ typedef struct pal_frame_spin {
     int node, end, n_face;
     const pal_frame_face *face; /* the fan [n_face] */
     double tilt[9], twist[3], Z[3];
+    /* upper bounds of the forces of a torque of 1 Nm, 1/m: of its own node, of the edge's end, and of all nodes; of a
+     * node of the fan `ring` 1/m2 times the length of the edge to its neighbour there */
+    double own, edge, all, ring;
 } pal_frame_spin;
 
 /* frame `slot` of display.skin at the present positions; face: memory for the fan, kept */
@@ -26,4 +29,6 @@ void pal_frame_spin_find(const pal_body *body, int slot, pal_frame_face *face, p
 void pal_frame_spin_of(const pal_frame_spin *frame, const double *u, double spin[3]);
 /* the transpose: a torque on the frame as forces, added to `own` at its node and to out [n_node][3] elsewhere */
 void pal_frame_spin_add_torque(const pal_frame_spin *frame, const double torque[3], double own[3], double *out);
+/* out [n_node] += upper bounds of the forces of a torque of this size */
+void pal_frame_spin_add_bound(const pal_frame_spin *frame, double torque_Nm, double *out);
 #endif

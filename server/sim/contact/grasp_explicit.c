@@ -1,6 +1,7 @@
-/* Grasps with explicit solvers. k and c are kept below the limits alpha m_i / dt^2 and alpha m_i / dt of every free
- * node, m_i being shared by the tools that hold it; where nodes are interpolated, alpha times what the tissue
- * held weighs at least. */
+/* Grasps with explicit solvers. Where the solver takes the stiffness of loads implicitly, k and c are what the scene
+ * says, and row sums (k + c/dt) W_i go to it. Elsewhere they are kept below the limits alpha m_i / dt^2 and alpha m_i /
+ * dt of every free node, m_i being shared by the tools that hold it; where nodes are interpolated, alpha times what the
+ * tissue held weighs at least. */
 #include "server/base/vec3.h"
 #include "server/sim/contact/grasp.h"
 #include "server/sim/contact/tuning.h"
@@ -22,13 +23,16 @@ static double min_mass_kg(const pal_grasps *grasps, const pal_grasp *g, const pa
 void pal_grasp_act_explicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *tool, pal_step *step)
 {
     pal_body *body = step->body;
-    double y[3], v[3], goal[3], damper[3], scaled[3], mass = min_mass_kg(grasps, g, body);
+    double y[3], v[3], goal[3], damper[3], scaled[3];
 
     pal_grasp_mean(g, body->d, y);
     pal_grasp_mean(g, body->dv, v);
-    double k = fmin(pal_grasp_stiffness_N_m(grasps, pal_grasp_reach_m(grasps, tool)),
-                    GRASP_SHARE * mass / (step->dt_s * step->dt_s));
-    double c = fmin(k * grasps->damping_s, GRASP_SHARE * mass / step->dt_s);
+    double k = pal_grasp_stiffness_N_m(grasps, pal_grasp_reach_m(grasps, tool)), c = k * grasps->damping_s;
+    if (!body->load_stiffness) {
+        const double most_kg = GRASP_SHARE * min_mass_kg(grasps, g, body);
+        k = fmin(k, most_kg / (step->dt_s * step->dt_s));
+        c = fmin(k * grasps->damping_s, most_kg / step->dt_s);
+    }
     for (int d = 0; d < 3; d++) damper[d] = c * (tool->velocity_m_s[d] - v[d]), scaled[d] = tool->ramp * damper[d];
     pal_grasp_find_goal(g, tool, step, tool->ramp * k, scaled, goal);
     if (g->adaptive) pal_adaptive_grasp_goal(g->adaptive, tool->requested.quat, y, v, k, step->dt_s, goal);
@@ -37,6 +41,8 @@ void pal_grasp_act_explicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *to
         pal_set3(g->force, 0, 0, 0);
         return;
     }
+    for (int i = 0; i < g->n_node && body->load_stiffness; i++)
+        body->load_stiffness[g->node[i]] += tool->ramp * (k + c / step->dt_s) * g->weight[i];
     double max_node_N = pal_grasp_max_weight(g) * pal_norm3(g->force), on_tissue[3];
     pal_scale3(g->force, pal_tool_force_share(body, tool, g->force, max_node_N), g->force);
     pal_scale3(on_tissue, -1, g->force);

@@ -22,6 +22,7 @@ typedef struct pal_push_regime {
     /* explicit regimes: largest contact stiffness over mass times dt^2, damping time over dt, a bound of the
      * eigenvalues of M^-1 K of contact, 1/s^2; after other triangles were drawn the force does not rise */
     double stiffness_limit, damping_steps;
+    double pressure; /* pal_push_pressure_of_radius: stiffness per area in E over radius */
     double (*eigenvalue_1_s2)(pal_contact_points *points, const pal_body *body, const pal_contact *contact, int n);
     bool limits_rise;
 } pal_push_regime;
@@ -40,7 +41,7 @@ struct pal_push {
     int n_stiffness, n_step;      /* stiffnesses found in this step; steps, to give each tool its turn    */
 };
 
-/* EXPLICIT_PRESSURE E / radius, or what the scene says */
+/* the regime's multiple of E / radius, or what the scene says */
 double pal_push_pressure_of_radius(const pal_push *push, const pal_body *body, int point, double radius_m);
 /* a multiple of the tissue's own stiffness under a contact half a radius wide, or what the scene says */
 double pal_push_pressure_of_tissue(const pal_push *push, const pal_body *body, int point, double radius_m);

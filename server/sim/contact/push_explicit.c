@@ -1,11 +1,11 @@
 /* Explicit contact: penalty forces with damping in every sub-step.
  *
  * A contact at depth d is pushed away from the proxy's centre with f = k (d - gamma dt v_away), v_away the tissue's own
- * speed. A common factor on k keeps the largest eigenvalue of contact stiffness over mass below alpha / dt^2. With a
- * and b the ratios of stiffness and damping to m / dt^2 and m / dt:
+ * speed. With a and b the ratios of stiffness and damping to m / dt^2 and m / dt:
  *
- * explicit: symplectic steps are stable for a + 2 b < 4. The solver's own limit leaves a <= 1 to the tissue; contact
- *     adds a <= alpha and b <= gamma alpha = alpha / 2, so that alpha < 1.5.
+ * explicit: gamma = 1/2. verlet takes the stiffness implicitly by its row sums (body->load_stiffness), so that neither
+ *     the sub-step nor the stiffness is bounded (verlet.c). Another solver has a common factor on k, which keeps the
+ *     largest eigenvalue of contact stiffness over mass below alpha / dt^2.
  * held load (rk4 of adaptive bodies): loads lag by dt/2. With gamma = 1, the nodes' own velocity and alpha = 0.5, b = a
  *     exceeds a/2, which makes up for the lag, and a + b <= 1: tissue is stopped and not thrown back. Where other
  *     triangles are drawn, as a finer surface bulges, the ramp of the contact falls so far that the force does not rise
@@ -44,7 +44,7 @@ static void add_friction(pal_push *push, pal_tool_contact *t, const pal_tool *to
 static void find_share(pal_push *push, pal_tool_contact *t, int n_tool, pal_step *step)
 {
     int n_share = 1;
-    if (t->n_contact == 0) return;
+    if (t->n_contact == 0 || step->body->load_stiffness) return;
     for (const pal_tool_contact *other = push->tool; other < push->tool + n_tool; other++)
         if (other != t && other->n_contact > 0)
             n_share += pal_contact_points_overlap(&push->points, step->body, t->contact, t->n_contact, other->contact,
@@ -76,6 +76,16 @@ static double limit_rise(pal_tool_contact *t, double sum[3])
     return part;
 }
 
+/* row sums of the stiffness of a tool's contacts, scaled, for a solver that takes them implicitly */
+static void add_stiffness(pal_push *push, const pal_tool_contact *t, double scale, pal_body *body)
+{
+    if (!body->load_stiffness) return;
+    pal_contact_points_begin_slots(&push->points);
+    for (int i = 0; i < t->n_contact; i++)
+        pal_contact_points_add_bound(&push->points, body, &t->contact[i], scale * t->contact[i].k_N_m);
+    pal_contact_points_assemble_bound(&push->points, body, body->load_stiffness);
+}
+
 /* forces of one tool to the nodes and back */
 static void press(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step *step)
 {
@@ -99,6 +109,7 @@ static void press(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step 
     if (push->regime->limits_rise) stiffness *= limit_rise(t, sum);
     if (!pal_finite3(sum) || pal_dot3(sum, sum) == 0) return;
     add_friction(push, t, tool, sum, stiffness, step->dt_s);
+    add_stiffness(push, t, scale, body);
     pal_set3(sum, 0, 0, 0);
     pal_contact_points_begin_slots(&push->points);
     for (int i = 0; i < t->n_contact; i++) {
@@ -146,12 +157,14 @@ static void act(pal_push *push, int n_tool, pal_step *step)
 }
 
 const pal_push_regime pal_push_explicit = {.pressure_Pa_m = pal_push_pressure_of_radius,
+                                           .pressure = EXPLICIT_PRESSURE,
                                            .act = act,
                                            .stiffness_limit = EXPLICIT_ALPHA,
                                            .damping_steps = 0.5,
                                            .eigenvalue_1_s2 = pal_contact_points_max_eigenvalue};
 
 const pal_push_regime pal_push_held_load = {.pressure_Pa_m = pal_push_pressure_of_radius,
+                                            .pressure = HELD_PRESSURE,
                                             .act = act,
                                             .stiffness_limit = 0.5,
                                             .damping_steps = 1,

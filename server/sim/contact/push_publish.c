@@ -6,7 +6,7 @@
 double pal_push_pressure_of_radius(const pal_push *push, const pal_body *body, int point, double radius_m)
 {
     (void)body, (void)point;
-    return push->asked_Pa_m > 0 ? push->asked_Pa_m : EXPLICIT_PRESSURE * push->material.young_Pa / radius_m;
+    return push->asked_Pa_m > 0 ? push->asked_Pa_m : push->regime->pressure * push->material.young_Pa / radius_m;
 }
 
 static double young_at(const pal_push *push, int point)

@@ -126,7 +126,10 @@ typedef struct pal_body {
     } model;
 
     /* ---- forces ---- */
-    double *load;           /* N, from CONTACT components and external_force, constant in a sub-step [n_node][3] */
+    double *load; /* N, from CONTACT components and external_force, constant in a sub-step [n_node][3] */
+    /* N/m, row sums of the stiffness of `load` that the solver takes implicitly, by a lumped matrix: contact then needs
+     * no shorter sub-steps. NULL: it does not. CONTACT components add                               [n_node] */
+    double *load_stiffness;
     double *external_force; /* N, lasting loads set by pal_world_load; NULL: none                    [n_node][3] */
     double *f;              /* N, load and the FORCE components                                      [n_node][3] */
     double *g;              /* N, A' f                                                               [n_dof][3]  */

@@ -54,7 +54,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     return pal_spring_lattice_join(&e->set, build);
 }
 
-/* with q = (l/l0)^2 and r = 1/sqrt(q): C (d/l)/l0 = (1 - r) d/l0^2 */
+/* with r = l/l0 = sqrt(q): C (d/l)/l0 = (r - 1)/r d/l0^2 */
 PAL_INLINE void kernel(const double *p[][3], pal_wide w, pal_wide kq, pal_wide f[][3], pal_wide *min)
 {
     const pal_wide floor = PAL_ROUNDING * PAL_ROUNDING - (pal_wide){0}, one = 1 - (pal_wide){0};
@@ -62,7 +62,7 @@ PAL_INLINE void kernel(const double *p[][3], pal_wide w, pal_wide kq, pal_wide f
              dz = pal_wide_load(p[1][2]) - pal_wide_load(p[0][2]), w2 = w * w;
     pal_wide q = (dx * dx + dy * dy + dz * dz) * w2, known = pal_wide_select(w > 0, q, one);
     *min = pal_wide_select(known < *min, known, *min);
-    pal_wide s = kq * w2 * (pal_wide_inverse_sqrt(pal_wide_select(q < floor, floor, q)) - 1);
+    pal_wide r = pal_wide_sqrt(pal_wide_select(q < floor, floor, q)), s = kq * w2 * ((1 - r) / r);
     f[0][0] = s * dx, f[0][1] = s * dy, f[0][2] = s * dz;
 }
 

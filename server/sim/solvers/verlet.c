@@ -1,10 +1,19 @@
 /* Solver verlet: v += dt f/m, x += dt v (the velocity form of paper B section 4.1).
  *
  * Departures. Drag is implicit: v <- (v + dt f/m) / (1 + dt rate), where the rate is the sum of the components' drag
- * rates; it is stable for every rate. The sub-step is `safety` (key, 0.5) of the stability limit by Gershgorin's
+ * rates; it is stable for every rate. The sub-step is `safety` (key, 0.9) of the stability limit by Gershgorin's
  * bound: with K and C the row sums of stiffness and explicit damping, dt = safety * 2 t where t is the largest with
- * t^2 K + t C <= m at every free node. The bound is recomputed when a node may have moved a fifth of an element; where
- * it does in every sub-step, in one of four. Prescribed nodes keep their velocity. step_guard.h limits displacements.
+ * t^2 K + t C <= m at every free node. Voxel bodies of springs are stable up to 1.5 times that limit and more, of edges
+ * alone up to 1.05 times (power iteration, at rest and pulled); bounds of edges do not change. The bound is recomputed
+ * when a node may have moved a fifth of an element; where it does in every sub-step of half of the limit, in one of
+ * four of these. Prescribed nodes keep their velocity. step_guard.h limits displacements.
+ *
+ * Contact takes no part of the stability. Its stiffness K_c is taken implicitly by the diagonal D of its row sums
+ * (body->load_stiffness): (m + dt^2 D) dv = dt f, as in a linearly implicit Euler step with a lumped matrix. With D >=
+ * K_c and a damping of contact of dt/2 K_c, x'(dt^2 K + 2 dt^2 K_c) x < 4 x'(M + dt^2 D) x whenever dt^2 K < 4 M:
+ * stable for any stiffness of contact, which therefore does not depend on the sub-step. A node at rest has the same
+ * balance.
+ *
  * Where the budget of sub-steps is exhausted (step->adds_mass), mass is added to the nodes that break the inequality.
  * Changes of added mass would add energy, so such a node loses up to a hundredth of its velocity per sub-step.
  * Components check for inverted elements whenever the bound is computed, and in every step while there are any. */
@@ -26,23 +35,24 @@ typedef struct part_result {
 typedef struct verlet {
     double *stiff, *damp; /* Gershgorin row sums, N/m and Ns/m [n_dof] */
     double safety;        /* of the stability limit             */
-    double limit_s;
-    double moved_m;      /* upper bound of motion since the bound was computed */
-    double last_m;       /* of that, in the last sub-step                       */
-    part_result *result; /* of the last sub-step                              [n_part] */
-    int n_since;         /* sub-steps since then                                */
-    bool known;          /* limit_s holds                                       */
-    bool has_inversion;  /* bounds must be computed again in the coming step */
+    double stable_s;      /* that limit                         */
+    double moved_m;       /* upper bound of motion since the bound was computed */
+    double speed_m_s;     /* largest of the last sub-step                        */
+    part_result *result;  /* of the last sub-step                              [n_part] */
+    int n_since;          /* sub-steps since then                                */
+    bool known;           /* stable_s holds                                      */
+    bool has_inversion;   /* bounds must be computed again in the coming step */
 } verlet;
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    double safety = 0.5;
+    double safety = 0.9;
     PAL_TRY(pal_entry_read_number(item, "safety", 0.01, 0.9, &safety, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     verlet *solver = PAL_NEW(build->arena, verlet, 1);
     if (!solver) return PAL_ERR_MEMORY;
-    if (!PAL_NEW_DOUBLES(build->arena, build->body->n_dof, &solver->stiff, &solver->damp)) return PAL_ERR_MEMORY;
+    if (!PAL_NEW_DOUBLES(build->arena, build->body->n_dof, &solver->stiff, &solver->damp, &build->body->load_stiffness))
+        return PAL_ERR_MEMORY;
     solver->result = PAL_NEW(build->arena, part_result, pal_node_order_parts(build->body->node_order));
     if (!solver->result) return PAL_ERR_MEMORY;
     solver->safety = safety;
@@ -50,7 +60,18 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     return PAL_ERR_OK;
 }
 
-/* the smallest over free nodes of 2 safety t, t the positive root of t^2 K + t C = m */
+/* nodes pass a fifth of an element in each sub-step of half of the limit */
+static bool is_fast(const verlet *solver, double move_m)
+{
+    return solver->speed_m_s * PAL_FAST_SAFETY * solver->stable_s > move_m;
+}
+
+static double usable_s(const verlet *solver, double move_m)
+{
+    return (is_fast(solver, move_m) ? fmin(solver->safety, PAL_FAST_SAFETY) : solver->safety) * solver->stable_s;
+}
+
+/* safety times the smallest over free nodes of 2 t, t the positive root of t^2 K + t C = m */
 static double limit(void *self, pal_step *step)
 {
     verlet *solver = self;
@@ -58,8 +79,8 @@ static double limit(void *self, pal_step *step)
     bool contact = step->sub == 0 && pal_guard_has_bounds(step->contact, step->n_contact);
     bool has_inversion = step->sub == 0 && solver->has_inversion;
     const double move_m = PAL_GUARD_MOVE * body->edge_m;
-    const bool holds = solver->moved_m <= move_m || (solver->last_m > move_m && solver->n_since < PAL_FAST_SUBSTEPS);
-    if (solver->known && !contact && !has_inversion && holds) return solver->limit_s;
+    const bool holds = solver->moved_m <= move_m || (is_fast(solver, move_m) && solver->n_since < PAL_FAST_SUBSTEPS);
+    if (solver->known && !contact && !has_inversion && holds) return usable_s(solver, move_m);
     solver->has_inversion = pal_guard_recover(step) & PAL_INVERTED;
     size_t n_byte = sizeof(double) * (size_t)body->n_dof;
     memset(solver->stiff, 0, n_byte);
@@ -71,14 +92,14 @@ static double limit(void *self, pal_step *step)
         double k = solver->stiff[i], c = solver->damp[i], m = body->mass_kg[i];
         sum += 0 * k + 0 * c;
         if (body->support[i] || k + c == 0) continue;
-        double dt = solver->safety * 4 * m / (c + sqrt(c * c + 4 * k * m));
+        double dt = 4 * m / (c + sqrt(c * c + 4 * k * m));
         if (dt < min) min = dt;
     }
-    solver->limit_s = sum == 0 ? min : NAN;
-    solver->moved_m = solver->last_m = 0;
+    solver->stable_s = sum == 0 ? min : NAN;
+    solver->moved_m = 0;
     solver->n_since = 0;
     solver->known = true;
-    return solver->limit_s;
+    return usable_s(solver, move_m);
 }
 
 typedef struct pass {
@@ -99,10 +120,13 @@ static void push_nodes(const pass *p, int first, int end, part_result *out)
     for (int i = first; i < end; i++) {
         double *v = body->v + 3 * i, m = body->mass_kg[i];
         const double *g = body->g + 3 * i;
-        double s = body->support[i] ? 0 : dt / m, k = !body->support[i] ? p->keep : body->support[i] == 2 ? 1 : 0;
+        const double load_kg = dt * dt * body->load_stiffness[i];
+        double s = body->support[i] ? 0 : dt / (m + load_kg), k = !body->support[i]       ? p->keep
+                                                                  : body->support[i] == 2 ? 1
+                                                                                          : 0;
         if (p->adds_mass && !body->support[i]) {
             double heavy = fmax(m, root * (root * solver->stiff[i] + solver->damp[i]));
-            s = dt / heavy, k *= 1 - PAL_HEAVY_LOSS * (1 - m / heavy);
+            s = dt / (heavy + load_kg), k *= 1 - PAL_HEAVY_LOSS * (1 - m / heavy);
         }
         for (int c = 0; c < 3; c++) v[c] = k * (v[c] + s * g[c]);
         double v2 = pal_dot3(v, v);
@@ -155,10 +179,9 @@ static pal_err run(void *self, pal_step *step)
         non_finite += made->non_finite;
         body->safeguards.n_clamped += made->n_clamped, body->safeguards.ns += made->ns;
     }
-    const double move_m = sqrt(max2) * dt;
+    solver->speed_m_s = fmin(sqrt(max2), p.max_m / dt);
     /* a non-finite velocity makes the displacement, and so the next limit, non-finite */
-    solver->last_m = (move_m < p.max_m ? move_m : p.max_m) + non_finite;
-    solver->moved_m += solver->last_m;
+    solver->moved_m += solver->speed_m_s * dt + non_finite;
     solver->n_since++;
     return PAL_ERR_OK;
 }
@@ -166,7 +189,9 @@ static pal_err run(void *self, pal_step *step)
 static void reset(void *self, const pal_body *body)
 {
     (void)body;
-    ((verlet *)self)->known = false;
+    verlet *solver = self;
+    solver->known = false;
+    solver->speed_m_s = 0;
 }
 
 const pal_effect pal_effect_verlet = {PAL_EFFECT("verlet", SOLVE), .moves_nodes = true, .bounds.limit = limit,

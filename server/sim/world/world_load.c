@@ -39,6 +39,7 @@ void pal_body_begin_loads(pal_body *body)
     }
     if (!body->active && lasting) memcpy(body->load, lasting, n_byte);
     if (!body->active && !lasting) memset(body->load, 0, n_byte);
+    if (body->load_stiffness) memset(body->load_stiffness, 0, n_byte / 3);
 }
 
 /* A part of a supported body that many loads pull out, each within its cap, stretches by their sum and overshoots to

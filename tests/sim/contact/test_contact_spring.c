@@ -203,7 +203,7 @@ static void mean_moves_as_its_points_do(void)
 }
 
 /* the largest eigenvalue of M^-1 K, 1/s^2, by many power iterations */
-static double eigenvalue_1_s2(spring_scene *t)
+static double eigenvalue_1_s2(spring_scene *t, const double *mass_kg)
 {
     const pal_body *body = t->s.body;
     double *u = field(body, 3, 1), *ku = calloc(3 * (size_t)body->n_node, sizeof *ku), rate = 0;
@@ -212,9 +212,9 @@ static double eigenvalue_1_s2(spring_scene *t)
         memset(ku, 0, 3 * sizeof *ku * (size_t)body->n_node);
         pal_contact_springs_multiply(&t->springs, 1, u, ku);
         for (int i = 0; i < 3 * body->n_node; i++) {
-            double m = body->mass_kg[i / 3];
+            double m = mass_kg[i / 3];
             uku += u[i] * ku[i], u2 += m * u[i] * u[i];
-            ku[i] = body->support[i / 3] ? 0 : ku[i] / m;
+            ku[i] = body->support[i / 3] || m == 0 ? 0 : ku[i] / m;
         }
         rate = uku / u2;
         for (int i = 0; i < 3 * body->n_node; i++) u[i] = ku[i] / rate;
@@ -235,12 +235,39 @@ static void few_power_iterations_find_most_of_the_eigenvalue(void)
             for (int i = 0; i < t.n; i++)
                 REQUIRE(pal_contact_springs_add(&t.springs, t.contact[i].point, t.contact[i].away,
                                                 t.contact[i].k_N_m) == i);
-            double exact = eigenvalue_1_s2(&t);
+            double exact = eigenvalue_1_s2(&t, t.s.body->mass_kg);
             double found = pal_contact_points_max_eigenvalue(&t.points, t.s.body, t.contact, t.n);
             printf("  %s, %d contacts: %.4g of %.4g 1/s^2, %.3f\n", skinned ? "ball" : "slab", t.n, found, exact,
                    exact / found);
             CHECK_LE(found, exact * (1 + 1e-9));
             CHECK_LE(exact, EIGENVALUE_SAFETY * found);
+            close_springs(&t);
+        }
+}
+
+/* D of verlet is no less than K: the eigenvalues of D^-1 K are at most 1. Where a contact is that of one node, they are
+ * one */
+static void row_sums_bound_the_stiffness_of_contact(void)
+{
+    for (int skinned = 0; skinned < 2; skinned++)
+        for (int n = 1; n < MAX_CONTACTS; n *= 3) {
+            spring_scene t;
+            REQUIRE(open_springs(&t, skinned));
+            if (n < t.n) t.n = n;
+            double *bound = calloc((size_t)t.s.body->n_node, sizeof *bound);
+            pal_contact_points_begin_slots(&t.points);
+            for (int i = 0; i < t.n; i++)
+                pal_contact_points_add_bound(&t.points, t.s.body, &t.contact[i], t.contact[i].k_N_m);
+            pal_contact_points_assemble_bound(&t.points, t.s.body, bound);
+            pal_contact_springs_begin(&t.springs);
+            for (int i = 0; i < t.n; i++)
+                REQUIRE(pal_contact_springs_add(&t.springs, t.contact[i].point, t.contact[i].away,
+                                                t.contact[i].k_N_m) == i);
+            double largest = eigenvalue_1_s2(&t, bound);
+            printf("  %s, %d contacts: %.3f\n", skinned ? "ball" : "slab", t.n, largest);
+            CHECK_LE(largest, 1 + 1e-9);
+            CHECK_LE(0.05, largest);
+            free(bound);
             close_springs(&t);
         }
 }
@@ -292,6 +319,7 @@ int main(void)
     RUN(loads_have_the_contacts_force_and_torque);
     RUN(mean_moves_as_its_points_do);
     RUN(few_power_iterations_find_most_of_the_eigenvalue);
+    RUN(row_sums_bound_the_stiffness_of_contact);
     RUN(stiffness_is_that_of_springs_in_series_with_tissue);
     return check_report();
 }

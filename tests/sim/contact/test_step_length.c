@@ -51,15 +51,14 @@ static bool press(tool_scene *s, int hz, history *out)
     return true;
 }
 
-/* Bounds against 1,000 steps a second. Held: implicit, the tolerance of the solver, 1 %; explicit, 6 %: the stiffness
- * of contact is at most what its sub-step allows, alpha m / dt^2, so that the ball sinks in by a few per cent of the
- * depth more where the solver's limit divides the step less well (measured 4.8 %, tissue and contact being in series).
- * Pressing: a tool is as far as at the end of its step, so that the tissue is up to two steps of its way behind, 2 v dt
- * of the depth, and as held. Fading: the share of the force is that of the end of the step, off by one step of the fade
- * at most. The published stiffness follows the force, within 2 % more. */
+/* Bounds against 1,000 steps a second. Held: 1 %, the tolerance of an implicit solver; explicit contact has the same
+ * stiffness whatever the sub-step. Pressing: a tool is as far as at the end of its step, so that the tissue is up to
+ * two steps of its way behind, 2 v dt of the depth, and as held. Fading: the share of the force is that of the end of
+ * the step, off by one step of the fade at most. The published stiffness follows the force, within 2 % more; of
+ * springs it is continued from step to step while the press goes on, within 8 %. */
 static void compare(bool fem)
 {
-    const double held_share = fem ? 0.01 : 0.06;
+    const double held_share = 0.01;
     history of[RATES];
     for (int k = 0; k < RATES; k++) {
         fem_scene f;
@@ -81,7 +80,7 @@ static void compare(bool fem)
         CHECK_NEAR(of[k].pressing_N, exact->pressing_N,
                    exact->pressing_N * (held_share + 2 * speed_m_s * dt_s / (0.5 * depth_m)));
         CHECK_NEAR(of[k].fading_N, exact->fading_N, held * (held_share + dt_s / (1.0 / 6)));
-        CHECK_NEAR(of[k].pressing_N_m, exact->pressing_N_m, (held_share + 0.02) * exact->pressing_N_m);
+        CHECK_NEAR(of[k].pressing_N_m, exact->pressing_N_m, (fem ? 0.03 : 0.08) * exact->pressing_N_m);
         CHECK_NEAR(of[k].held_N_m, exact->held_N_m, (held_share + 0.02) * exact->held_N_m);
         CHECK_LE(of[k].rest_m, 1e-4 * 0.1);
     }

@@ -160,7 +160,8 @@ static void forces_are_the_gradient_of_their_energy(void)
     bench_close(&b);
 }
 
-static void chooses_half_the_stable_substep_or_less(void)
+/* 0.9 of Gershgorin's limit, which is 1.6 times and more below the stable sub-step */
+static void chooses_two_thirds_of_the_stable_substep_or_less(void)
 {
     bench b;
     REQUIRE(bench_open(&b, 4, 3, 3, 0));
@@ -175,8 +176,8 @@ static void chooses_half_the_stable_substep_or_less(void)
         solve->effect->reset(solve->self, b.body);
         double chosen = solve->effect->bounds.limit(solve->self, &step), stable = 2 / sqrt(largest_w2(&b.plan, &seed));
         printf("  chosen %.3g ms, stable %.3g ms, ratio %.2f\n", 1e3 * chosen, 1e3 * stable, chosen / stable);
-        CHECK_LE(chosen, 0.5 * stable * 1.001);
-        CHECK_LE(0.15 * stable, chosen);
+        CHECK_LE(chosen, 0.6 * stable);
+        CHECK_LE(0.3 * stable, chosen);
     }
     bench_close(&b);
 }
@@ -485,7 +486,7 @@ int main(void)
     RUN(internal_components_are_zero_at_rest);
     RUN(internal_components_have_no_net_force_or_torque);
     RUN(forces_are_the_gradient_of_their_energy);
-    RUN(chooses_half_the_stable_substep_or_less);
+    RUN(chooses_two_thirds_of_the_stable_substep_or_less);
     RUN(masses_of_voxels_allow_longer_substeps_and_keep_moments);
     RUN(a_breathing_tetrahedron_has_the_analytic_period);
     RUN(a_scaled_tetrahedron_has_the_analytic_energy_and_virial);
