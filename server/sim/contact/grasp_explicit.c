@@ -29,9 +29,9 @@ void pal_grasp_act_explicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *to
     pal_grasp_mean(g, body->dv, v);
     double k = pal_grasp_stiffness_N_m(grasps, pal_grasp_reach_m(grasps, tool)), c = k * grasps->damping_s;
     if (!body->load_stiffness) {
-        const double most_kg = GRASP_SHARE * min_mass_kg(grasps, g, body);
-        k = fmin(k, most_kg / (step->dt_s * step->dt_s));
-        c = fmin(k * grasps->damping_s, most_kg / step->dt_s);
+        const double limit_kg = GRASP_SHARE * min_mass_kg(grasps, g, body);
+        k = fmin(k, limit_kg / (step->dt_s * step->dt_s));
+        c = fmin(k * grasps->damping_s, limit_kg / step->dt_s);
     }
     for (int d = 0; d < 3; d++) damper[d] = c * (tool->velocity_m_s[d] - v[d]), scaled[d] = tool->ramp * damper[d];
     pal_grasp_find_goal(g, tool, step, tool->ramp * k, scaled, goal);

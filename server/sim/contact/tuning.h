@@ -49,7 +49,7 @@ enum { STIFFNESS_PASSES = 2 };
 /* contact stiffness per area in E over radius: depth is then 1 % of a radius at a mean pressure of E. Half of it
  * presses with 5 % less force, twice as much with 6 % more (test_step_length), and the published stiffness is then 5 %
  * off that of the force (test_tool_push) */
-#define EXPLICIT_PRESSURE 100
+#define EXPLICIT_PRESSURE 80
 /* the same where the solver holds loads: less than the sub-step allows, but for very soft springs (test_adaptive_body)
  */
 #define HELD_PRESSURE 200
