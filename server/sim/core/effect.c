@@ -12,7 +12,7 @@ static bool skips(const pal_step *step, const pal_effect *effect, pal_forces whi
     return effect->drag || effect->internal != (which == PAL_FORCES_INTERNAL);
 }
 
-pal_err pal_run_forces(pal_step *step, pal_forces which)
+static pal_err run_each(pal_step *step, pal_forces which)
 {
     const bool packed = which == PAL_FORCES_PACKED;
     uint64_t before = pal_clock_ns();
@@ -26,6 +26,15 @@ pal_err pal_run_forces(pal_step *step, pal_forces which)
         before = now;
     }
     return PAL_ERR_OK;
+}
+
+pal_err pal_run_forces(pal_step *step, pal_forces which)
+{
+    pal_node_order *order = step->body->node_order;
+    if (order) pal_node_order_begin(order);
+    const pal_err err = run_each(step, which);
+    if (order) pal_node_order_end(order, step->body->f);
+    return err;
 }
 
 /* forces begin as the loads; in the parts of the nodes, so that a thread's nodes stay in its caches */

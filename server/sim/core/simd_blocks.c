@@ -399,7 +399,7 @@ static int find_parts(const part_search *s, pal_part_blocks *out, int n[2])
     return max;
 }
 
-pal_err pal_part_blocks_make(const pal_simd_blocks *blocks, const pal_node_order *node_order, pal_arena *arena,
+pal_err pal_part_blocks_make(const pal_simd_blocks *blocks, pal_node_order *node_order, pal_arena *arena,
                              pal_part_blocks *out)
 {
     int n[2];
@@ -420,6 +420,7 @@ pal_err pal_part_blocks_make(const pal_simd_blocks *blocks, const pal_node_order
         if (!err) *out = made, (void)find_parts(&s, out, n);
     }
     free(s.node_of), free(s.seen);
+    if (!out->first) node_order->undivided = true;
     return err;
 }
 
@@ -433,12 +434,14 @@ void pal_part_load(const pal_part_blocks *blocks, const pal_node_order *node_ord
 {
     const pal_node_order own = node_order->part[part];
     const int end = pal_part_first(own.n_node, node_order->n_part, part + 1);
-    for (int i = pal_part_first(own.n_node, node_order->n_part, part); i < end; i++) load_node(&own, i, x);
+    for (int i = pal_part_first(own.n_node, node_order->n_part, part); i < end && !node_order->loaded; i++)
+        load_node(&own, i, x);
     for (int k = blocks->other_first[part]; k < blocks->other_first[part + 1]; k++)
         load_node(&own, blocks->other[k], x);
 }
 
-void pal_part_add(const pal_part_blocks *blocks, const pal_node_order *node_order, int part, double *force)
+/* force += the forces at the part's own nodes, which are zero afterwards */
+static void add_own(const pal_node_order *node_order, int part, double *force)
 {
     const pal_node_order own = node_order->part[part];
     const int end = pal_part_first(own.n_node, node_order->n_part, part + 1);
@@ -448,6 +451,34 @@ void pal_part_add(const pal_part_blocks *blocks, const pal_node_order *node_orde
             force[3 * i + d] += *from;
             *from = 0;
         }
+}
+
+void pal_part_add(const pal_part_blocks *blocks, const pal_node_order *node_order, int part, double *force)
+{
+    const pal_node_order own = node_order->part[part];
+    if (!node_order->shares) add_own(node_order, part, force);
     for (int k = blocks->other_first[part]; k < blocks->other_first[part + 1]; k++)
         for (int d = 0; d < 3; d++) own.f[own.slot[blocks->other[k]] + d * own.n_slot] = 0;
+}
+
+void pal_node_order_begin(pal_node_order *node_order)
+{
+    node_order->shares = true;
+    node_order->loaded = false;
+}
+
+static void end_part(void *user, int worker, int part)
+{
+    const node_pass *pass = user;
+    (void)worker;
+    add_own(pass->order, part, pass->force);
+}
+
+void pal_node_order_end(pal_node_order *node_order, double *force)
+{
+    node_pass pass = {.order = node_order, .force = force};
+    const bool in_parts = node_order->n_part > 0 && !node_order->undivided;
+    if (node_order->loaded && in_parts) pal_team_run(node_order->team, node_order->n_part, end_part, &pass);
+    if (node_order->loaded && !in_parts) run_nodes(&pass);
+    node_order->shares = node_order->loaded = false;
 }

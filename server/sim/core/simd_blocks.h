@@ -25,6 +25,9 @@ typedef struct pal_node_order {
     pal_team *team;              /* threads that share passes over nodes and blocks; NULL: the caller's alone */
     int n_part;                  /* of an order that is divided between threads (pal_node_order_divide), else 0 */
     struct pal_node_order *part; /* the same slots with x and f of their own                        [n_part] */
+    /* between pal_node_order_begin and _end; x, or the x of all parts, is loaded; a component of the body is not
+     * divided */
+    bool shares, loaded, undivided;
 } pal_node_order;
 
 /* the blocks of one component */
@@ -88,12 +91,17 @@ static inline int pal_part_first(int n_node, int n_part, int part)
 }
 /* Makes nothing where the order is not divided, or where the largest part would have so many of the blocks that threads
  * would repeat each other's work (PAL_PART_MAX); MEMORY */
-pal_err pal_part_blocks_make(const pal_simd_blocks *blocks, const pal_node_order *node_order, pal_arena *arena,
+pal_err pal_part_blocks_make(const pal_simd_blocks *blocks, pal_node_order *node_order, pal_arena *arena,
                              pal_part_blocks *out);
 /* positions x [n_node][3] to the arrays of a part, as far as its blocks read them; force [n_node][3] += the forces at
- * the part's own nodes, and the arrays are zero afterwards */
+ * the part's own nodes, and the arrays are zero afterwards. Of components that share an order (begin to end below) the
+ * first loads the part's own nodes, and their forces stay for the end */
 void pal_part_load(const pal_part_blocks *blocks, const pal_node_order *node_order, int part, const double *x);
 void pal_part_add(const pal_part_blocks *blocks, const pal_node_order *node_order, int part, double *force);
+/* Components of one evaluation of forces share an order: positions are loaded once, and the sums of all are added once,
+ * to force [n_node][3]. All of a body run in parts, or none. Elsewhere each loads and adds */
+void pal_node_order_begin(pal_node_order *node_order);
+void pal_node_order_end(pal_node_order *node_order, double *force);
 /* node_order->x = positions x [n_node][3] */
 void pal_node_order_load(pal_node_order *node_order, const double *x);
 /* force [n_node][3] += node_order->f, which is zero afterwards */

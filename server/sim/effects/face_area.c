@@ -22,7 +22,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     return err ? err : pal_spring_lattice_join(set, build);
 }
 
-/* with q = (A/A0)^2 and r = 1/sqrt(q): C n/|n| = (1 - r) n w, and the gradients are crosses of n with the edges */
+/* with r = A/A0 = sqrt(q): C n/|n| = (r - 1)/r n w, and the gradients are crosses of n with the edges */
 PAL_INLINE void kernel(const double *p[][3], pal_wide w, pal_wide kq, pal_wide f[][3], pal_wide *min)
 {
     (void)min;
@@ -32,7 +32,7 @@ PAL_INLINE void kernel(const double *p[][3], pal_wide w, pal_wide kq, pal_wide f
     pal_wide bx = pal_wide_load(p[2][0]) - x, by = pal_wide_load(p[2][1]) - y, bz = pal_wide_load(p[2][2]) - z;
     pal_wide nx = ay * bz - az * by, ny = az * bx - ax * bz, nz = ax * by - ay * bx;
     pal_wide q = (nx * nx + ny * ny + nz * nz) * w2;
-    pal_wide t = kq * w2 * (pal_wide_inverse_sqrt(pal_wide_select(q < floor, floor, q)) - 1);
+    pal_wide r = pal_wide_sqrt(pal_wide_select(q < floor, floor, q)), t = kq * w2 * ((1 - r) / r);
     nx *= t, ny *= t, nz *= t;
     f[0][0] = by * nz - bz * ny, f[0][1] = bz * nx - bx * nz, f[0][2] = bx * ny - by * nx;
     f[1][0] = ny * az - nz * ay, f[1][1] = nz * ax - nx * az, f[1][2] = nx * ay - ny * ax;

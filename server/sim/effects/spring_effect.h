@@ -41,15 +41,16 @@ typedef struct spring_pass {
     {                                                                                                                  \
         pal_node_order *order = body->node_order;                                                                      \
         double min = 1;                                                                                                \
-        if (set->part_blocks.first) {                                                                                  \
+        if (set->part_blocks.first && !order->undivided) {                                                             \
             spring_pass pass = {.set = set, .body = body};                                                             \
             pal_team_run(body->team, order->n_part, spring_part, &pass);                                               \
             for (int p = 0; p < order->n_part; p++) min = pass.min[p] < min ? pass.min[p] : min;                       \
-            return min;                                                                                                \
+        } else {                                                                                                       \
+            if (!order->loaded) pal_node_order_load(order, body->d);                                                   \
+            min = pal_spring_run(set, order, NULL, set->simd_blocks.n_lane / PAL_LANES, kernel, N_CORNER);             \
+            if (!order->shares) pal_node_order_add(order, body->f);                                                    \
         }                                                                                                              \
-        pal_node_order_load(order, body->d);                                                                           \
-        min = pal_spring_run(set, order, NULL, set->simd_blocks.n_lane / PAL_LANES, kernel, N_CORNER);                 \
-        pal_node_order_add(order, body->f);                                                                            \
+        order->loaded = order->shares;                                                                                 \
         return min;                                                                                                    \
     }
 
