@@ -232,7 +232,7 @@ static pal_packet *offer(const pal_control *hello)
     return packet;
 }
 
-/* epochs only grow: viewers would take an older one for what they have */
+/* of any part, since epochs of a server only grow: viewers would take an older one for what they have */
 static bool is_older(const pal_relay_kept *k, const pal_wire_topology *t)
 {
     for (uint32_t p = 0; p < t->n_part; p++)
