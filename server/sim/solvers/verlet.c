@@ -3,10 +3,10 @@
  * Departures. Drag is implicit: v <- (v + dt f/m) / (1 + dt rate), where the rate is the sum of the components' drag
  * rates; it is stable for every rate. The sub-step is `safety` (key, 0.9) of the stability limit by Gershgorin's
  * bound: with K and C the row sums of stiffness and explicit damping, dt = safety * 2 t where t is the largest with
- * t^2 K + t C <= m at every free node. Voxel bodies of springs are stable up to 1.5 times that limit and more, of edges
- * alone up to 1.05 times (power iteration, at rest and pulled); bounds of edges do not change. The bound is recomputed
- * when a node may have moved a fifth of an element; where it does in every sub-step of half of the limit, in one of
- * four of these. Prescribed nodes keep their velocity. step_guard.h limits displacements.
+ * t^2 K + t C <= m at every free node. Voxel bodies of springs are stable up to 1.5 times that limit and more (power
+ * iteration, at rest and pulled); those of edges alone less far, but their row sums do not change. The bound is
+ * recomputed when a node may have moved a fifth of an element; where it does in every sub-step of half of the limit, in
+ * one of four of these. Prescribed nodes keep their velocity. step_guard.h limits displacements.
  *
  * Contact takes no part of the stability. Its stiffness K_c is taken implicitly by the diagonal D of its row sums
  * (body->load_stiffness): (m + dt^2 D) dv = dt f, as in a linearly implicit Euler step with a lumped matrix. With D >=
