@@ -1,8 +1,7 @@
 /* From a surface to voxels (paper B section 2.2): inside, border, components.
  *
  * The grid begins one voxel outside the corner of the box of the surface, so the first centre lies half a voxel inside
- * it. Inside voxels are bits, so that their face neighbours are a shift and
- * two neighbouring rows. */
+ * it. Inside voxels are bits, so that their face neighbours are a shift and two neighbouring rows. */
 #include "server/mesh/voxel/voxels.h"
 
 #include "server/base/clock.h"
@@ -115,17 +114,33 @@ static void take_layer(void *self, int z, const double *fraction)
     }
 }
 
-/* What is left out of the filled voxels: voxels inside other components, and those around them that touch no voxel of
- * this one */
-static pal_err leave_out(const pal_bits *others, const pal_bits *border, pal_bits *filled)
+/* inside voxels and those that share a face, an edge or a corner with one */
+static void find_touching(const pal_bits *inside, pal_bits *to)
 {
-    pal_bits around;
-    PAL_TRY(pal_bits_create(others->n, &around));
-    find_border(others, &around);
-    for (size_t i = 0; i < pal_bits_words(filled); i++)
-        filled->word[i] &= ~(others->word[i] | (around.word[i] & ~border->word[i]));
-    pal_bits_free(&around);
-    return PAL_ERR_OK;
+    const int n_word = inside->n_word;
+    for (int i = 0; i < (inside->n[1] - 2) * (inside->n[2] - 2); i++) {
+        const int y = 1 + i % (inside->n[1] - 2), z = 1 + i / (inside->n[1] - 2);
+        const uint64_t *row = pal_bits_row(inside, y, z);
+        for (int w = 0; w < n_word; w++) {
+            const uint64_t left = w + 1 < n_word ? row[w + 1] << 63 : 0, right = w > 0 ? row[w - 1] >> 63 : 0;
+            const uint64_t b = row[w] | row[w] << 1 | right | row[w] >> 1 | left;
+            for (int k = 0; k < 9 && b; k++) pal_bits_row(to, y + k % 3 - 1, z + k / 3 - 1)[w] |= b;
+        }
+    }
+}
+
+/* What is left out of the filled voxels: voxels inside other components, and those that touch these and no voxel inside
+ * this one. Of a flap of another component thinner than a voxel parts may stay */
+static pal_err leave_out(const pal_bits *others, const pal_bits *inside, pal_bits *filled)
+{
+    pal_bits near = {.word = NULL}, far = {.word = NULL};
+    pal_err err = pal_bits_create(inside->n, &near);
+    if (!err) err = pal_bits_create(inside->n, &far);
+    if (!err) find_touching(inside, &near), find_touching(others, &far);
+    for (size_t i = 0; i < pal_bits_words(filled) && !err; i++)
+        filled->word[i] &= ~(others->word[i] | (far.word[i] & ~near.word[i]));
+    pal_bits_free(&near), pal_bits_free(&far);
+    return err;
 }
 
 /* In place of the face neighbours of the inside: all voxels of which min lies inside and that faces join to it, some
@@ -139,7 +154,7 @@ static pal_err keep_filled(const pal_surface *surface, const pal_bits *inside, c
     uint64_t *kept = filled.bits.word;
     pal_err err = pal_voxels_fraction(surface, grid, false, take_layer, &filled, diag);
     for (size_t i = 0; i < n_word; i++) *n_dropped += __builtin_popcountll(border->word[i] & ~kept[i]);
-    if (!err && others->word) err = leave_out(others, border, &filled.bits);
+    if (!err && others->word) err = leave_out(others, inside, &filled.bits);
     for (size_t i = 0; i < n_word; i++) kept[i] |= inside->word[i];
     if (!err) err = pal_bits_keep_joined(&filled.bits, inside);
     for (size_t i = 0; i < n_word; i++) border->word[i] = kept[i] & ~inside->word[i];
