@@ -44,6 +44,7 @@ static void add_friction(pal_push *push, pal_tool_contact *t, const pal_tool *to
 static void find_share(pal_push *push, pal_tool_contact *t, int n_tool, pal_step *step)
 {
     int n_share = 1;
+    if (step->body->load_stiffness) t->share = 1;
     if (t->n_contact == 0 || step->body->load_stiffness) return;
     for (const pal_tool_contact *other = push->tool; other < push->tool + n_tool; other++)
         if (other != t && other->n_contact > 0)

@@ -46,12 +46,11 @@ enum { STIFFNESS_PASSES = 2 };
 
 /* ---- explicit contact ---- */
 
-/* contact stiffness per area in E over radius: depth is then 1 % of a radius at a mean pressure of E. Half of it
- * presses with 5 % less force, twice as much with 6 % more (test_step_length), and the published stiffness is then 5 %
- * off that of the force (test_tool_push) */
+/* contact stiffness per area in E over radius: depth is then 1/80 of a radius at a mean pressure of E. With 100 the
+ * published stiffness is more than 6 % off that of the force (test_tool_push) */
 #define EXPLICIT_PRESSURE 80
-/* the same where the solver holds loads: less than the sub-step allows, but for very soft springs (test_adaptive_body)
- */
+/* the same where the solver holds loads through its stages. For all but very soft springs this is more than the
+ * sub-step allows, so that the limit there decides (test_adaptive_body) */
 #define HELD_PRESSURE 200
 /* contact stiffness over m / dt^2, for solvers that do not take it implicitly. Symplectic steps are stable for a + 2 b
  * < 4 with a and b the ratios of stiffness and damping to m / dt^2 and m / dt; with half of the stability limit for

@@ -25,6 +25,7 @@ pal_err pal_woodbury_make(const pal_system *system, const pal_component *compone
 void pal_woodbury_reset(pal_woodbury *woodbury)
 {
     for (int k = 0; k < woodbury->n; k++) woodbury->spring[k].spring.revision = 0, woodbury->spring[k].acts = false;
+    woodbury->left_s = 0, woodbury->column = 0;
 }
 
 /* a column of U, from M */
@@ -99,7 +100,8 @@ void pal_woodbury_update(pal_woodbury *woodbury, pal_preconditioner *m, double *
         renew(woodbury, &woodbury->spring[woodbury->column / 3], woodbury->column % 3, m, work);
         woodbury->left_s = PAL_WOODBURY_RENEWAL_S;
     }
-    for (int k = 0; k < woodbury->n; k++) woodbury->spring[k].acts &= invert(woodbury, &woodbury->spring[k]);
+    for (int k = 0; k < woodbury->n; k++)
+        if (woodbury->spring[k].acts) woodbury->spring[k].acts = invert(woodbury, &woodbury->spring[k]);
 }
 
 /* U'r */

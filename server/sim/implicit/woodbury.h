@@ -5,7 +5,8 @@
  *     A^-1 r ~ z + U (G^-1 U'r - B^-1 W'z),    z = M^-1 (r - W B^-1 U'r),    G = U'A U ~ B + c B B.
  * With U as it should be this is the inverse by Sherman, Morrison and Woodbury (Hager 1989, doi:10.1137/1031049); with
  * any other it stays symmetric and positive definite. Without it conjugate gradients spend an iteration or two on three
- * eigenvalues some 17 times as large as all others. Of several springs each takes those before it as part of M.
+ * eigenvalues some 17 times as large as all others. Of several springs each takes those after it as part of M. U is
+ * from M alone, so that for springs that hold the same tissue this is not the exact inverse.
  *
  * U costs three solves with M and changes slowly, as the body turns: a column is renewed every PAL_WOODBURY_RENEWAL_S.
  * Memory: the solver's arena, 36 bytes a dof and spring, only where some component has such springs. Thread: [load] to

@@ -14,7 +14,8 @@
  * (tests/stability/test_springs_cases.c) */
 enum { PAL_FAST_SUBSTEPS = 4 };
 /* verlet: part of the stability limit in such a motion. With the usual one a slender organ that a meganewton has drawn
- * out gains 0.4 of the energy that was put in (tests/robustness/test_robustness_answers.c) */
+ * out gains 0.4 of the energy that was put in (tests/robustness/test_robustness_answers.c), and a stretched slab with
+ * added mass a hundred times its own (tests/sim/contact/test_step_length.c) */
 #define PAL_FAST_SAFETY 0.5
 /* static_newton: operations of a factor per entry that are worth one iteration with it, a product and two triangular
  * passes (tests/sim/solvers/test_fem_static.c) */

@@ -111,10 +111,63 @@ static void a_proxys_side_turns_as_far_at_every_step_length(void)
     CHECK_NEAR(angle[RATES - 1], 60 * (1 - exp(-0.1 / FOLLOW_S)), 5);
 }
 
+/* A stretched slab without damping that has no more sub-steps than at rest gets mass in their place: it keeps its
+ * energy */
+static void added_mass_gains_no_energy(void)
+{
+    for (int k = 0; k < 2; k++) {
+        const double stretch = k ? 3 : 1.5;
+        tool_scene s;
+        REQUIRE(slab_scene(&s, 12, 3, 3, 0.01, 1, 0.015, 15));
+        s.scene->body[0].material.damping_1_s = 0;
+        REQUIRE(!pal_entry_put_bool(&s.scene->body[0].model, "recover", false, NULL));
+        s.scene->body[0].n_effect = 0;
+        s.scene->step_s = 1.0 / 60;
+        REQUIRE(tool_scene_open(&s));
+        s.scene->max_substep = (k ? 2 : 1) * pal_world_substeps(s.world);
+        pal_world_destroy(s.world);
+        REQUIRE(tool_scene_open(&s));
+        for (int i = 0; i < s.body->n_dof; i++)
+            if (!s.body->support[i]) s.body->x[3 * i] *= stretch;
+        pal_world_invalidate_limits(s.world, 0);
+        const double first = pal_world_energy_J(s.world);
+        double largest = 0;
+        for (int i = 0; i < 200 && step_world(&s, 1); i++) largest = fmax(largest, pal_world_energy_J(s.world));
+        CHECK(s.body->safeguards.n_mass_scaled > 0);
+        CHECK_INT(s.body->safeguards.n_clamped, 0);
+        CHECK_LE(largest, first);
+        tool_scene_close(&s);
+    }
+}
+
+/* what a solver has learnt of a grasp is forgotten by a reset */
+static void a_grasp_after_a_reset_repeats_the_first(void)
+{
+    fem_scene f;
+    uint64_t hash[3];
+    REQUIRE(fem_slab(&f, 8, 8, 4, 0.01, 1, 0.015, 15));
+    f.s.scene->step_s = 1.0 / 60;
+    REQUIRE(tool_scene_open(&f.s));
+    for (int k = 0; k < 3; k++) {
+        for (int i = 0; i < 38; i++) {
+            const double t = i / 60.0;
+            move_tool(&f.s, 0, 0.04, 0.04 + 0.01 * t, 0.04 + 0.005 * (i > 5 ? t : 0), i > 3);
+            REQUIRE(step_world(&f.s, 1));
+        }
+        CHECK(tool_of(&f.s, 0)->holding);
+        hash[k] = pal_world_hash(f.s.world);
+        pal_world_reset(f.s.world);
+    }
+    CHECK(hash[0] == hash[1] && hash[0] == hash[2]);
+    fem_close(&f);
+}
+
 int main(void)
 {
     RUN(a_proxys_side_turns_as_far_at_every_step_length);
     RUN(an_implicit_press_is_the_same_at_every_step_length);
     RUN(an_explicit_press_is_the_same_at_every_step_length);
+    RUN(added_mass_gains_no_energy);
+    RUN(a_grasp_after_a_reset_repeats_the_first);
     return check_report();
 }
