@@ -16,7 +16,7 @@ typedef struct pal_clock {
     /* returns at when_ns, or earlier after a wake, even one shortly before the sleep: the caller compares the time */
     void (*sleep_until_ns)(void *user, uint64_t when_ns);
     /* Interrupts every sleep, because a thread is to end or the result of another thread has come. NULL: no thread
-     * sleeps longer than the caller may wait */
+     * sleeps longer than the caller may wait, and the times are those of CLOCK_MONOTONIC */
     void (*wake)(void *user);
     void *user;
 } pal_clock;

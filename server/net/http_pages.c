@@ -200,9 +200,10 @@ static void print_metrics(const metric *row, const metric *end, char *text, size
 /* time of steps by session, whose label is its number; returns the bytes written */
 static size_t print_histograms(const pal_hub *hub, char *text, size_t cap)
 {
-    size_t n = (size_t)snprintf(text, cap,
-                                "# HELP palpate_sim_step_seconds_by_session Processor time of a step.\n"
-                                "# TYPE palpate_sim_step_seconds_by_session histogram\n");
+    size_t n = (size_t)snprintf(
+        text, cap,
+        "# HELP palpate_sim_step_seconds_by_session Processor time of a step; at rest of one in a tenth of a second.\n"
+        "# TYPE palpate_sim_step_seconds_by_session histogram\n");
     for (int r = 0; r < hub->n_room && n < cap; r++) {
         const pal_stream *s = hub->room[r]->stream;
         const int label = hub->room[r]->number;

@@ -5,14 +5,15 @@
  * n_late, the number of steps that began a tenth of a step or more after their due time. Input does not accumulate:
  * the newest pose of a tool wins, and at most 64 commands are taken before a step. While paused, a command or a pose
  * publishes a frame, in which tools follow their holders. A tool without a pose for lease_s is released; its force
- * ramps out over PAL_BLEND_S (server/sim/core/blend.h).
+ * ramps out over PAL_BLEND_S (server/sim/core/blend.h). While all bodies sleep and nobody looks, holds a tool or gives
+ * a command, steps of PAL_REST_NS are taken together, with one frame; who comes ends such a rest at once.
  *
  * Threads exchange data through triple buffers (poses, frames), a command queue and the wake callback. A lock guards
- * only the diagnostic of pal_session_last_diagnostic, the materials and the place in a recording that plays. Between
- * open and close the session neither allocates nor touches files, except when a subscription to a field or an estimate
- * begins or ends, or a brush begins or has faded: its component, and the field's part of the frames, are then created
- * or freed between two steps. Fields and estimates are not input: the input log does not record them and they change no
- * hash. Brushes are input. */
+ * only the diagnostic of pal_session_last_diagnostic, the materials, the place in a recording that plays, and a rest.
+ * Between open and close the session neither allocates nor touches files, except when a subscription to a field or an
+ * estimate begins or ends, or a brush begins or has faded: its component, and the field's part of the frames, are then
+ * created or freed between two steps. Fields and estimates are not input: the input log does not record them and they
+ * change no hash. Brushes are input. */
 #ifndef PAL_SESSION_SESSION_H
 #define PAL_SESSION_SESSION_H
 #include "server/base/clock.h"

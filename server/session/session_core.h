@@ -1,4 +1,5 @@
-/* The struct of a session, shared by session_thread.c, session_play.c and session_transfer.c. Private to them. */
+/* The struct of a session, shared by session_thread.c, session_pace.c, session_play.c and session_transfer.c. Private
+ * to them. */
 #ifndef PAL_SESSION_SESSION_CORE_H
 #define PAL_SESSION_SESSION_CORE_H
 #include "server/base/command_queue.h"
@@ -68,9 +69,9 @@ struct pal_session {
     _Atomic uint64_t beat_ns, n_refused;
     _Atomic int n_observer; /* observers of frames; used with only_observed */
     _Atomic bool rests;     /* the thread sleeps for several steps, unless it is called */
+    _Atomic bool called;    /* there is something to look at that no step has looked at */
     pthread_mutex_t lock;
     pthread_cond_t call;
-    bool called;         /* guarded by lock: the thread is to look at once */
     pal_playing playing; /* guarded by lock */
     pal_diagnostic diag;
     pal_material material[PAL_BODY_MAX]; /* guarded by lock */
@@ -112,7 +113,9 @@ static inline uint64_t session_now_ns(const pal_session *s)
 /* [sim] Waits for the due time; a step at least one whole step late is due now, and the missed ones are dropped.
  * Returns how many steps are due, more than one after a rest; 0: the thread is to end */
 int pal_session_pace(pal_session *session, uint64_t *due);
-void pal_session_call(pal_session *session); /* ends a rest [any] */
+/* [any] There is something to look at: ends a rest, or keeps the next one from beginning. After what is to be seen,
+ * which the next step then sees: [sim] clears `called` before it looks */
+void pal_session_call(pal_session *session);
 /* [sim] the newest diagnostic, for any thread to read */
 void pal_session_put_diagnostic(pal_session *session, const pal_diagnostic *diag);
 /* [sim] Takes the records of the recording that precede its next step (session_play.c); true: one changed the world. A

@@ -29,16 +29,16 @@ static void rest(pal_session *s, uint64_t when_ns)
         return;
     }
     pthread_mutex_lock(&s->lock);
-    while (!s->called && pthread_cond_timedwait(&s->call, &s->lock, &when) == 0) {
+    while (!atomic_load(&s->called) && pthread_cond_timedwait(&s->call, &s->lock, &when) == 0) {
     }
-    s->called = false;
     pthread_mutex_unlock(&s->lock);
 }
 
 void pal_session_call(pal_session *s)
 {
+    atomic_store(&s->called, true);
+    if (!atomic_load(&s->rests)) return;
     pthread_mutex_lock(&s->lock);
-    s->called = true;
     pthread_cond_signal(&s->call);
     pthread_mutex_unlock(&s->lock);
     pal_clock_wake(s->options.clock);
@@ -52,13 +52,13 @@ int pal_session_pace(pal_session *s, uint64_t *due)
     const bool rests = is_idle(s);
     int n = rests && PAL_REST_NS > step_ns ? (int)(PAL_REST_NS / step_ns) : 1;
     *due = s->options.unpaced && !s->paused ? now : *due + (uint64_t)n * step_ns;
-    /* who comes after this is seen to rest here, and who came before it is seen now */
+    /* who calls after this sees that it rests, and who called before it is seen here */
     atomic_store(&s->rests, rests);
-    if (rests && now < *due && atomic_load(&s->n_observer) == 0) rest(s, *due);
+    if (rests && now < *due && !atomic_load(&s->called)) rest(s, *due);
     atomic_store(&s->rests, false);
     now = session_now_ns(s);
     if (rests && now < *due) {
-        n = now > began + step_ns ? (int)((now - began) / step_ns) : 1;
+        n = now > began + step_ns ? (int)((now - began + step_ns - 1) / step_ns) : 1;
         *due = began + (uint64_t)n * step_ns;
     }
     for (; now < *due && !is_stopped(s); now = session_now_ns(s)) clock->sleep_until_ns(clock->user, *due);

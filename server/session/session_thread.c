@@ -1,7 +1,8 @@
 /* The simulation thread: takes commands and the newest poses, steps the world, publishes a frame, and sleeps until the
  * next absolute time. It waits for no other thread: poses and frames use triple buffers, commands a queue. The only
- * lock guards the last diagnostic, the materials and the place in a recording; an ordinary step does not take it.
- * While all bodies sleep and nobody looks, the thread rests for several steps, which it takes together afterwards.
+ * lock guards the last diagnostic, the materials and the place in a recording, and a rest; an ordinary step does not
+ * take it. While all bodies sleep and nobody looks, the thread rests for several steps, which it takes together
+ * afterwards.
  *
  * Slowdown is real time over simulated time since a mark that is 1 to 1 + 1/16 s old. */
 #include "server/session/session_core.h"
@@ -326,6 +327,7 @@ static void *simulate(void *user)
     for (int n; (n = pal_session_pace(s, &due)) > 0;) {
         /* those of a rest, in which nothing came */
         for (int k = 1; k < n; k++) step(s);
+        atomic_store(&s->called, false);
         bool changed = take_commands(s);
         uint64_t now = session_now_ns(s);
         atomic_store_explicit(&s->beat_ns, now, memory_order_relaxed);
@@ -436,6 +438,7 @@ void pal_session_stop(pal_session *s)
 {
     atomic_store_explicit(&s->stop, true, memory_order_release);
     pal_session_call(s);
+    pal_clock_wake(s->options.clock);
     if (s->running) pthread_join(s->thread, NULL);
     s->running = false;
 }
@@ -581,7 +584,7 @@ pal_err pal_session_request_pose(pal_session *s, int tool, const pal_pose *pose)
     if (pose) slot->pose = *pose;
     slot->arrived_ns = session_now_ns(s);
     pal_triple_buffer_publish(&s->tool[tool].triple_buffer);
-    if (atomic_load(&s->rests)) pal_session_call(s);
+    pal_session_call(s);
     return PAL_ERR_OK;
 }
 
@@ -612,7 +615,7 @@ pal_err pal_session_command(pal_session *s, const pal_command *command)
 {
     if (!is_valid(s, command)) return refuse(s);
     const pal_err err = pal_command_queue_put(s->command, command);
-    if (atomic_load(&s->rests)) pal_session_call(s);
+    pal_session_call(s);
     return err;
 }
 
@@ -629,7 +632,7 @@ const pal_frame *pal_session_take_frame(pal_session *s)
 bool pal_session_observe(pal_session *s, bool observes)
 {
     const int before = atomic_fetch_add(&s->n_observer, observes ? 1 : -1);
-    if (atomic_load(&s->rests)) pal_session_call(s);
+    pal_session_call(s);
     return observes && before == 0 && s->options.only_observed;
 }
 

@@ -78,7 +78,8 @@ enum { PAL_SPRING_GRID_NODES_MAX = 1 << 20 };
  * tests/replay/test_golden.c has a body with more) */
 enum { PAL_PART_NODES = 750 };
 /* active nodes of an adaptive surface for each of its threads: with fewer, waiting for each other costs what they save
- * (`palpate bench adaptive`: two threads take the time of one at 746 nodes, 0.8 of it at 1,794;
+ * (`palpate bench adaptive`: two threads take the time of one at 746 nodes, at 1,794 0.75 of it in
+ * half of the runs and 1.3 times in the others, where both cores seem to be one; from 3,000 on no run is slower;
  * tests/replay/test_golden.c has a surface with more) */
 enum { PAL_PART_ACTIVE = 500 };
 /* elements of a subdivision solid that threads share: with fewer, their waits cost what they save (`palpate bench
