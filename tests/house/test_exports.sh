@@ -77,13 +77,15 @@ end
 
 begin "an adaptive surface as glTF and VTP"
 run prepare --procedural --model adaptive -o thin
-run serve thin/scene.json --record thin.log --port 0 --seconds 0.3
-run replay thin.log thin/scene.json --gltf thin.glb --vtp thin.vtp
+# it sinks by gravity
+sed 's/"step_s":/"gravity_m_s2": 2, "step_s":/; s/"name":[[:space:]]*"sleep"/"name": "gravity"/' thin/scene.json >thin/sinks.json
+run serve thin/sinks.json --record thin.log --port 0 --seconds 0.3
+run replay thin.log thin/sinks.json --gltf thin.glb --vtp thin.vtp
 check "exit code $code" code_is 0
 reads surface thin.vtp >thin.json
 check "VTK reads another surface" [ $? -eq 0 ]
 check "glTF has another surface" gltf_reads surface thin.glb thin.json
-run replay thin.log thin/scene.json --vtu nothing
+run replay thin.log thin/sinks.json --vtu nothing
 refused 1 'no body of the scene has elements of volume'
 end
 
