@@ -3,10 +3,11 @@
  * Each point near the tool has a spring of stiffness k along `away`. In contact it is active: its load begins at k d,
  * tissue that moves by m along `away` reduces it by k m, and the force is k (d - m). Active springs that pull, and
  * points that came through the sphere, are exchanged and the solver solves again where they bear a noticeable part of
- * the forces, at most twice; after that only where contact would pull as a whole. Coulomb friction is two more springs
- * across the mean direction, as stiff as all springs that are active at first, on the load-weighted mean of the points;
- * beyond friction times the normal force they become that constant force. Springs of points that are only near do not
- * count: a moving tool would begin its sub-step with a load of which the solver's tolerance is the friction itself.
+ * the forces, at most three times; after that only where contact would pull as a whole. Coulomb friction is two more
+ * springs across the mean direction, as stiff as all springs that are active at first, on the load-weighted mean of the
+ * points; beyond friction times the normal force they become that constant force. Springs of points that are only near
+ * do not count: a moving tool would begin its sub-step with a load of which the solver's tolerance is the friction
+ * itself.
  *
  * Where the solve leaves more than the caps (pal_tool_force_share), all springs of the tool become constant forces
  * shortened to the caps and the solver solves once more (pal_tangent.settle). Tissue then moves less than before, so

@@ -29,6 +29,14 @@ static void spread(double block[36][9], double to[24][24])
                 to[3 * c + i / 3][3 * d + i % 3] = to[3 * d + i % 3][3 * c + i / 3] = block[pal_hex_pair(c, d)][i];
 }
 
+/* blocks of a piece of work of a thread: some five microseconds */
+enum { ROTATED = 128 };
+
+static int count_pieces(const pal_elastic_hexes *cubes)
+{
+    return (cubes->n_block + ROTATED - 1) / ROTATED;
+}
+
 pal_err pal_hex_single_make(const pal_elastic_hexes *cubes, const pal_body *body, pal_arena *arena,
                             pal_elastic_hexes_single *out)
 {
@@ -36,7 +44,10 @@ pal_err pal_hex_single_make(const pal_elastic_hexes *cubes, const pal_body *body
     *out =
         (pal_elastic_hexes_single){.cubes = cubes, .n_slot = body->node_order->n_slot, .slot = body->node_order->slot};
     out->stiff = PAL_NEW(arena, float, 2 * n);
-    if (cubes->law != PAL_LAW_LINEAR) out->rotation = PAL_NEW(arena, float, 9 * n);
+    if (cubes->law != PAL_LAW_LINEAR) {
+        out->rotation = PAL_NEW(arena, float, 9 * n);
+        if (!PAL_NEW_DOUBLES(arena, (size_t)count_pieces(cubes), &out->turned)) return PAL_ERR_MEMORY;
+    }
     int n_cut = 0;
     for (int b = 0; cubes->cut && b < cubes->n_block; b++) n_cut = cubes->cut[b] >= n_cut ? cubes->cut[b] + 1 : n_cut;
     if (n_cut > 0 && !(out->weight = PAL_NEW(arena, float, 8 * PAL_LANES * (size_t)n_cut))) return PAL_ERR_MEMORY;
@@ -66,22 +77,33 @@ void pal_hex_single_stiffen(pal_elastic_hexes_single *single)
     }
 }
 
-/* blocks of a piece of work of a thread: some five microseconds */
-enum { ROTATED = 128 };
-
 static void rotate_piece(void *user, int worker, int index)
 {
     const pal_elastic_hexes_single *single = user;
     const int n_block = single->cubes->n_block, first = index * ROTATED,
               end = first + ROTATED < n_block ? first + ROTATED : n_block;
     (void)worker;
-    for (int i = 9 * PAL_LANES * first; i < 9 * PAL_LANES * end; i++)
-        single->rotation[i] = (float)single->cubes->rotation[i];
+    double lane[PAL_LANES] = {0}, sum = 0;
+    for (int i = 9 * PAL_LANES * first; i < 9 * PAL_LANES * end; i += PAL_LANES)
+        for (int l = 0; l < PAL_LANES; l++) {
+            const float to = (float)single->cubes->rotation[i + l];
+            const double change = (double)(to - single->rotation[i + l]);
+            single->rotation[i + l] = to;
+            lane[l] += change * change;
+        }
+    for (int l = 0; l < PAL_LANES; l++) sum += lane[l];
+    single->turned[index] = sum;
 }
 
-void pal_hex_single_rotate(pal_elastic_hexes_single *single, pal_team *team)
+double pal_hex_single_rotate(pal_elastic_hexes_single *single, pal_team *team)
 {
-    if (single->rotation) pal_team_run(team, (single->cubes->n_block + ROTATED - 1) / ROTATED, rotate_piece, single);
+    const int n_piece = count_pieces(single->cubes);
+    double sum = 0;
+    if (!single->rotation) return 0;
+    pal_team_run(team, n_piece, rotate_piece, single);
+    for (int k = 0; k < n_piece; k++) sum += single->turned[k];
+    /* a small turn by w changes R by skew(w) R, whose entries have the sum of squares 2 w.w */
+    return sqrt(0.5 * sum / single->cubes->n_hex);
 }
 
 /* 8 numbers of each block */

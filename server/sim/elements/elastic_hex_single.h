@@ -14,6 +14,7 @@ typedef struct pal_elastic_hexes_single {
     float *stiff;            /* mu, lambda times h / 16, N/m                   [n_block][2][8] */
     float *weight;   /* as in cubes: of blocks with a cut element [blocks that are cut][8][8]; NULL: there are none */
     float *rotation; /* [n_block][9][8]; NULL: the law is linear */
+    double *turned;  /* sums of squares of a change of rotations by piece of the blocks */
 } pal_elastic_hexes_single;
 
 /* MEMORY. [load] */
@@ -21,8 +22,9 @@ pal_err pal_hex_single_make(const pal_elastic_hexes *cubes, const pal_body *body
                             pal_elastic_hexes_single *out);
 /* takes the present material */
 void pal_hex_single_stiffen(pal_elastic_hexes_single *single);
-/* takes the rotations of the last linearise. team: NULL, or threads that share the work */
-void pal_hex_single_rotate(pal_elastic_hexes_single *single, pal_team *team);
+/* takes the rotations of the last linearise; returns by how many radians elements have turned, as RMS. team: NULL, or
+ * threads that share the work */
+double pal_hex_single_rotate(pal_elastic_hexes_single *single, pal_team *team);
 /* no element has turned: pal_hex_single_element gives the matrices of rest */
 bool pal_hex_single_rests(const pal_elastic_hexes_single *single);
 /* out += k K p; empty slots of p are 0. team: NULL, or threads that share the work; the same bits with any number */

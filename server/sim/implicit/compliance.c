@@ -74,6 +74,7 @@ static bool solve_points(pal_compliance_solver *solver, const pal_body *body, do
     known->size2 = size2;
     known->used = ++solver->n_call;
     solver->cg.energy = 0;
+    pal_preconditioner_rotate(&solver->preconditioner);
     if (share != 0) {
         for (int i = 0; i < n; i++) move_m[i] = share * (double)known->move[i];
         multiply(solver, move_m, solver->cg.q);

@@ -463,9 +463,9 @@ static void find_lambda(pal_hex_multigrid *mg)
     mg->now.lambda = pal_chebyshev_lambda(size_of, apply, mg);
 }
 
-void pal_hex_multigrid_rotate(pal_hex_multigrid *mg)
+double pal_hex_multigrid_rotate(pal_hex_multigrid *mg)
 {
-    pal_hex_single_rotate(&mg->levels->single, mg->levels->body->team);
+    return pal_hex_single_rotate(&mg->levels->single, mg->levels->body->team);
 }
 
 pal_err pal_hex_multigrid_update(pal_hex_multigrid *mg, double mass, double stiff)
@@ -474,7 +474,7 @@ pal_err pal_hex_multigrid_update(pal_hex_multigrid *mg, double mass, double stif
     pal_hex_values *now = &mg->now;
     pal_spare_thread_wait(&mg->spare_thread);
     pal_hex_single_stiffen(&levels->single);
-    pal_hex_single_rotate(&levels->single, levels->body->team);
+    (void)pal_hex_single_rotate(&levels->single, levels->body->team);
     const bool rest = pal_hex_single_rests(&levels->single),
                same = now->mass == mass && now->stiff == stiff && now->rest && rest;
     now->mass = mass, now->stiff = stiff;

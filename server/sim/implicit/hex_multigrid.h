@@ -69,7 +69,8 @@ pal_err pal_hex_multigrid_refresh(pal_hex_multigrid *mg, double mass, double sti
 /* waits for them and puts them into use. NUMERIC, MEMORY: the ones before stay */
 pal_err pal_hex_multigrid_adopt(pal_hex_multigrid *mg);
 double pal_hex_multigrid_flops(const pal_hex_multigrid *mg); /* operations of a refresh, equal on all machines */
-void pal_hex_multigrid_rotate(pal_hex_multigrid *mg); /* takes the rotations of the last linearise, finest level */
+/* takes the rotations of the last linearise, finest level; returns by how many radians elements have turned, as RMS */
+double pal_hex_multigrid_rotate(pal_hex_multigrid *mg);
 /* largest of diagonal of A over mass_kg, at the last update */
 double pal_hex_multigrid_stiffest(const pal_hex_multigrid *mg);
 /* z ~ A^-1 r [n_dof][3], z may be r; warp: since the last update */

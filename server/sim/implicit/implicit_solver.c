@@ -226,6 +226,11 @@ static void solve_linear(pal_implicit *core, double target)
     for (int i = 0; i < body->n_dof; i++)
         prescribed_moves = prescribed_moves || (body->support[i] && pal_dot3(p + 3 * i, p + 3 * i) > 0);
     double before = norm(core, r);
+    if (before <= target && !prescribed_moves) { /* where it is linearised it is in balance */
+        memcpy(v, core->start, pal_body_bytes3(body));
+        core->cg.residual = before;
+        return;
+    }
     if (core->system.has_contact) {
         pal_woodbury_guess(&core->woodbury, r, p);
         for (int i = 0; i < core->cg.n; i++) v[i] = core->start[i] + p[i];
@@ -347,11 +352,17 @@ static void line_search(pal_implicit *core, double tau)
     core->report.step_size = step;
 }
 
+/* the preconditioner to the state that the forces are linearised at */
+static void turn(pal_implicit *core)
+{
+    if (!pal_preconditioner_follow(&core->preconditioner)) return;
+    pal_node_rotations_update(&core->rotations, &core->system);
+    pal_preconditioner_rotate(&core->preconditioner);
+}
+
 /* one Newton iteration from `start`, where the forces are linearised and cg.r is the residual */
 static void iterate(pal_implicit *core, double tau, double target)
 {
-    pal_node_rotations_update(&core->rotations, &core->system);
-    pal_preconditioner_rotate(&core->preconditioner);
     if (core->system.has_contact) pal_woodbury_update(&core->woodbury, &core->preconditioner, core->cg.z);
     memcpy(core->moved, core->cg.r, pal_body_bytes3(core->system.body));
     solve_linear(core, target);
@@ -413,7 +424,66 @@ static double load_size(pal_implicit *core)
     return norm(core, core->work);
 }
 
-pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
+/* the residual at `start`, and what the tolerance scales in the first iteration of a stage; returns its norm */
+static double begin_iteration(pal_implicit *core, double tau, bool first)
+{
+    const pal_body *body = core->system.body;
+    const double size = residual(core, tau, core->start, core->cg.r), left = norm(core, core->cg.r);
+    if (!first) return left;
+    core->reference = fmax(size, PAL_SOLVER_FLOOR * fmax(tau * load_size(core), left));
+    core->reference = fmax(core->reference, tau * negligible_N(body) * sqrt(body->n_dof));
+    return left;
+}
+
+/* rows of contact that touch nothing answer no motion, so neither this one, which none of their directions is across.
+ * What is not the mean of fixed nodes chooses its rows */
+static void find_contact(pal_implicit *core)
+{
+    double *p = core->cg.p, *q = core->cg.q;
+    for (int i = 0; i < core->cg.n; i += 3) p[i] = 1, p[i + 1] = M_SQRT2, p[i + 2] = M_PI;
+    core->system.has_contact = core->chooses = false;
+    for (int k = 0; k < core->system.n_contact; k++) {
+        const pal_component *component = &core->system.contact[k];
+        bool acts = false;
+        if (!component->effect->tangent || !component->effect->tangent->multiply) continue;
+        memset(q, 0, pal_body_bytes3(core->system.body));
+        pal_system_multiply_component(&core->system, component, 1, p, q);
+        for (int i = 0; i < core->cg.n && !acts; i++) acts = q[i] != 0;
+        core->system.has_contact |= acts;
+        core->chooses |= acts && !component->effect->tangent->mean_springs;
+    }
+}
+
+/* true: contact has changed its loads after the last solve */
+static bool settle_contact(pal_implicit *core, pal_step *step, bool last)
+{
+    if (!pal_system_settle_contact(&core->system, step, core->x0, core->moved, core->node_displacement_m, last))
+        return false;
+    /* energy is judged by the loads of the last solve, and points that came to touch act in it */
+    core->energy_rose = false;
+    find_contact(core);
+    return true;
+}
+
+/* one iteration, repeated from the same linearisation while contact changes its loads by it: roughly until it is found
+ * which points touch */
+static pal_err iterate_contact(pal_implicit *core, pal_step *step, double tau, double tolerance, double left)
+{
+    for (bool rough = core->chooses;;) {
+        const double best = tolerance * core->reference;
+        iterate(core, tau, rough ? fmax(best, PAL_ROUGH_TOLERANCE * left) : best);
+        const bool changed = settle_contact(core, step, true);
+        if (!changed && (!rough || core->cg.residual <= best)) break;
+        rough = changed && core->chooses;
+        set_positions(core, tau, core->start);
+        PAL_TRY(pal_assemble_forces(step));
+        left = begin_iteration(core, tau, true);
+    }
+    core->settled = true;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau, bool alone)
 {
     pal_body *body = core->system.body;
     pal_solve_report *to = &core->report;
@@ -427,11 +497,7 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
         if (k > 0) memcpy(core->start, body->v, pal_body_bytes3(core->system.body));
         PAL_TRY(pal_assemble_forces(step));
         if (k < max) pal_system_linearise(&core->system);
-        double size = residual(core, tau, core->start, core->cg.r), left = norm(core, core->cg.r);
-        if (k == 0) {
-            core->reference = fmax(size, PAL_SOLVER_FLOOR * fmax(tau * load_size(core), left));
-            core->reference = fmax(core->reference, tau * negligible_N(body) * sqrt(body->n_dof));
-        }
+        const double left = begin_iteration(core, tau, k == 0);
         /* while inverted elements move the state is far from any that is asked for, and conjugate gradients lower the
          * energy of the stage in every iteration. The preconditioner knows nothing of recovery: with 0.1 a drag of
          * 14,119 nodes takes 5 iterations, with 0.3 two or three. A body that nothing touches has to come to rest, for
@@ -446,14 +512,19 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
             if (again_ns) body->safeguards.ns += pal_clock_ns() - again_ns;
             return PAL_ERR_OK;
         }
+        turn(core);
+        core->settled = false;
         /* an iteration of several need not be solved better than the next one starts */
-        iterate(core, tau, core->options.newton > 1 ? fmax(0.3 * best, 1e-2 * left) : best);
+        if (k == 0 && alone && core->options.newton == 1 && step->n_contact > 0)
+            PAL_TRY(iterate_contact(core, step, tau, tolerance, left));
+        else
+            iterate(core, tau, core->options.newton > 1 ? fmax(0.3 * best, 1e-2 * left) : best);
         if (core->options.newton > 1) {
             if (core->system.has_energy) line_search(core, tau);
             continue;
         }
         to->residual = core->reference > 0 ? core->cg.residual / core->reference : 0;
-        to->converged = core->cg.residual <= best;
+        to->converged = core->cg.residual <= tolerance * core->reference;
         /* from here on all is a safeguard: the search, and the iterations that follow it */
         if (max > core->options.newton) body->safeguards.ns += pal_clock_ns() - again_ns;
         if (!rises(core, 0)) return PAL_ERR_OK;
@@ -462,6 +533,7 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
         if (core->energy_rose && !rises(core, PAL_SOLVER_TOLERANCE)) return PAL_ERR_OK;
         again_ns = pal_clock_ns();
         body->safeguards.n_search++;
+        core->settled = false;
         line_search(core, tau);
         if (max++ < PAL_SAFEGUARD_NEWTON) continue;
         core->energy_rose = rises(core, 0);
@@ -471,18 +543,6 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
 }
 
 /* ---- a sub-step ---- */
-
-/* rows of contact that touch nothing answer no motion, so neither this one, which none of their directions is across */
-static bool contact_acts(pal_implicit *core)
-{
-    double *p = core->cg.p, *q = core->cg.q;
-    for (int i = 0; i < core->cg.n; i += 3) p[i] = 1, p[i + 1] = M_SQRT2, p[i + 2] = M_PI;
-    memset(q, 0, pal_body_bytes3(core->system.body));
-    pal_system_multiply_contact(&core->system, 1, p, q);
-    for (int i = 0; i < core->cg.n; i++)
-        if (q[i] != 0) return true;
-    return false;
-}
 
 bool pal_implicit_begin(pal_implicit *core, pal_step *step)
 {
@@ -504,7 +564,7 @@ bool pal_implicit_begin(pal_implicit *core, pal_step *step)
     core->max_cg = 0;
     core->energy_rose = false;
     pal_system_linearise_contact(&core->system, step);
-    if (core->system.has_contact) core->system.has_contact = contact_acts(core);
+    find_contact(core);
     step->drag_separate = true;
     double slack;
     core->guarded = core->options.watch && core->options.newton == 1 && core->system.has_energy;
@@ -517,13 +577,9 @@ bool pal_implicit_begin(pal_implicit *core, pal_step *step)
 
 bool pal_implicit_settle(pal_implicit *core, pal_step *step, bool last)
 {
-    if (!pal_system_settle_contact(&core->system, step, core->x0, core->moved, core->node_displacement_m, last))
-        return false;
-    /* energy is judged by the loads of the last solve, and points that came to touch act in it */
-    core->energy_rose = false;
-    core->system.has_contact = true;
-    core->system.has_contact = contact_acts(core);
-    return true;
+    const bool settled = core->settled;
+    core->settled = false;
+    return !settled && settle_contact(core, step, last);
 }
 
 /* an interpolated body has other samples since its matrices were found: they are found again a few columns a step, then
@@ -563,15 +619,14 @@ void pal_implicit_end(pal_implicit *core, pal_step *step)
     pal_body_update_nodes(body);
     pal_preconditioner_step(&core->preconditioner, step->dt_s);
     pal_woodbury_step(&core->woodbury, step->dt_s);
-    if (core->compliance.hook.solve) {
-        pal_preconditioner_step(&core->compliance.preconditioner, step->dt_s);
-        pal_preconditioner_rotate(&core->compliance.preconditioner);
-    }
+    if (core->compliance.hook.solve) pal_preconditioner_step(&core->compliance.preconditioner, step->dt_s);
     if (core->system.interpolated_system) {
         update_probed(core, step);
         return;
     }
     if (!core->options.refresh || core->max_cg <= core->options.refresh_iterations) return;
+    if (!pal_preconditioner_ready(&core->preconditioner)) return;
+    pal_node_rotations_update(&core->rotations, &core->system); /* those of the elements, which it takes */
     (void)pal_preconditioner_refresh(&core->preconditioner, false);
 }
 
@@ -615,9 +670,9 @@ void pal_implicit_reset(void *self, const pal_body *body)
     core->rose_s = 0;
     if (core->system.n_free == 0) return;
     pal_node_rotations_reset(&core->rotations);
+    core->preconditioner.turn_rad = INFINITY;
     pal_woodbury_reset(&core->woodbury);
     pal_compliance_solver_reset(&core->compliance);
-    if (core->compliance.hook.solve) pal_preconditioner_rotate(&core->compliance.preconditioner);
     /* the same factor as at load, so that a run repeats; without memory for it the present one still serves */
     if (core->preconditioner.refreshed || core->preconditioner.pending || core->probing) (void)factor_at_rest(core);
 }

@@ -12,9 +12,10 @@
  * the sub-step. The last one ends where a search does, unless it gains less than the error of a solve.
  *
  * Contact gives its loads at the beginning of the sub-step; its stiffness acts on the motion since then,
- * and `settle` brings the forces on tools to the end of the sub-step. Fixed nodes move with body->v (0 unless
- * prescribed). The momentum of a free body is conserved to rounding whatever the tolerance, because the mean of the
- * residual is removed. step_guard.h limits displacements.
+ * and `settle` brings the forces on tools to the end of the sub-step. Where it changes which points touch, a sub-step
+ * of one stage is solved again from the same linearisation, roughly (PAL_ROUGH_TOLERANCE) until nothing changes. Fixed
+ * nodes move with body->v (0 unless prescribed). The momentum of a free body is conserved to rounding whatever the
+ * tolerance, because the mean of the residual is removed. step_guard.h limits displacements.
  *
  * Where nodes are interpolated from control points, the unknowns are the velocities of the control points and the
  * factor is that of the matrix at rest (interpolated_system.h). After a material edit that matrix is rebuilt over
@@ -57,6 +58,8 @@ typedef struct pal_implicit {
     double start_energy_J;       /* at the beginning of the sub-step */
     bool guarded;                /* energy is checked, see above */
     bool sound;                  /* the last check found x and v finite */
+    bool chooses;                /* contact acts whose points may cease to touch */
+    bool settled;                /* contact is, for the last solve */
     bool energy_rose;            /* the energy rose in this sub-step */
     double rose_s;               /* what is left of PAL_PAUSE_S since the last such sub-step */
     int max_cg;                  /* max iterations in one solve of this sub-step */
@@ -74,10 +77,11 @@ pal_err pal_implicit_make(pal_config_entry *item, pal_build *build, double share
  * (body->frozen is set) */
 bool pal_implicit_begin(pal_implicit *core, pal_step *step);
 /* body->x: state of the first linearisation; body->v: first guess of V and velocities of fixed nodes; both contain
- * the result. If loads change afterwards, set x and the guess again and solve again */
-pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau_s);
-/* after a stage; last: it is the last of the sub-step. true: contact has changed its loads, so the sub-step must be
- * solved again */
+ * the result. If loads change afterwards, set x and the guess again and solve again. alone: the sub-step has no other
+ * stage, so that contact may be settled within it */
+pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau_s, bool alone);
+/* after a stage, which may have settled contact; last: it is the last of the sub-step. true: contact has changed its
+ * loads, so the sub-step must be solved again */
 bool pal_implicit_settle(pal_implicit *core, pal_step *step, bool last);
 /* checks the result (not finite: the state at the beginning is restored and the body frozen) and refreshes the
  * factor */

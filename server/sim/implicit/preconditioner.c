@@ -185,7 +185,7 @@ pal_err pal_preconditioner_update(pal_preconditioner *p)
     p->update_s += pal_clock_s() - p->system->assemble_s - before;
     if (err) return err;
     p->n_update++;
-    p->refreshed = p->warp.rotated = false;
+    p->refreshed = p->warp.rotated = false, p->turn_rad = INFINITY;
     memcpy(p->warp.base, p->rotations->quat, 4 * sizeof(double) * (size_t)p->warp.n_dof);
     return PAL_ERR_OK;
 }
@@ -195,11 +195,17 @@ void pal_preconditioner_set_rest(pal_preconditioner *p)
     pal_warp_rest(p->warp.base, p->warp.n_dof);
 }
 
+bool pal_preconditioner_follow(pal_preconditioner *p)
+{
+    if (p->kind != PAL_PRECONDITION_MULTIGRID || p->shares) return true;
+    p->turn_rad += pal_hex_multigrid_rotate(&p->multigrid);
+    return p->turn_rad > PAL_TURN_RAD || p->multigrid.now.stiff_nodes.n > 0;
+}
+
 void pal_preconditioner_rotate(pal_preconditioner *p)
 {
-    if (p->kind == PAL_PRECONDITION_INCOMPLETE) return;
-    pal_warp_rotate(&p->warp, p->rotations, p->system->body->team);
-    if (p->kind == PAL_PRECONDITION_MULTIGRID && !p->shares) pal_hex_multigrid_rotate(&p->multigrid);
+    p->turn_rad = 0;
+    if (p->kind != PAL_PRECONDITION_INCOMPLETE) pal_warp_rotate(&p->warp, p->rotations, p->system->body->team);
 }
 
 bool pal_preconditioner_refresh(pal_preconditioner *p, bool at_rest)
@@ -233,7 +239,7 @@ void pal_preconditioner_step(pal_preconditioner *p, double dt_s)
         return;
     memcpy(p->warp.base, p->next, 4 * sizeof(double) * (size_t)p->warp.n_dof);
     p->n_update++;
-    p->refreshed = true;
+    p->refreshed = true, p->turn_rad = INFINITY;
 }
 
 /* ---- solves ---- */

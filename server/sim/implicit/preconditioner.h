@@ -42,6 +42,7 @@ typedef struct pal_preconditioner {
     double *inverse; /* jacobi [n_dof][9] */
     double *work;    /* [n_dof][3]; NULL: multigrid */
     double *next;    /* quat of those in progress [n_dof][4]; NULL: levels that are shared */
+    double turn_rad; /* of the elements since the warp was found, RMS, at most; infinite: it is of another base */
     bool single;     /* the factor is in single precision */
     bool refreshed;  /* factor or levels are newer than the last update */
     bool pending;    /* newer ones are in progress */
@@ -70,7 +71,10 @@ bool pal_preconditioner_suits_multigrid(const pal_system *system);
 pal_err pal_preconditioner_update(pal_preconditioner *p);
 /* declares what is in use to be of the body at rest, not at the present rotations */
 void pal_preconditioner_set_rest(pal_preconditioner *p);
-void pal_preconditioner_rotate(pal_preconditioner *p); /* to the present rotations */
+/* takes the elements' rotations of the last linearise; true: those of nodes are to be found again, and taken. Multigrid
+ * has them for its coarse levels alone, which a turn by less than PAL_TURN_RAD hardly changes */
+bool pal_preconditioner_follow(pal_preconditioner *p);
+void pal_preconditioner_rotate(pal_preconditioner *p); /* to the present rotations of nodes */
 /* z ~ A^-1 r; z may be r. cycle: of multigrid; PAL_CYCLE_V where it has to be symmetric */
 void pal_preconditioner_solve(pal_preconditioner *p, pal_cycle cycle, const double *r, double *z);
 /* the cycle for the next iteration of conjugate gradients. Two sawtooth cycles end most solves of bodies that nothing

@@ -181,6 +181,12 @@ void pal_system_multiply_contact(const pal_system *system, double k, const doubl
     if (system->has_contact) multiply_rows(system, system->contact, system->n_contact, k, p, out);
 }
 
+void pal_system_multiply_component(const pal_system *system, const pal_component *component, double k, const double *p,
+                                   double *out)
+{
+    multiply_rows(system, component, 1, k, p, out);
+}
+
 void pal_system_multiply_inertia(const pal_system *system, double mass, double damp, const double *p, double *out)
 {
     const pal_body *body = system->body;

@@ -52,6 +52,9 @@ double pal_system_inertia_norm2(const pal_system *system, double mass, double da
 void pal_system_multiply_stiffness(const pal_system *system, double k, const double *p, double *out);
 /* out += k K p of contact alone */
 void pal_system_multiply_contact(const pal_system *system, double k, const double *p, double *out);
+/* out += k K p of one component alone */
+void pal_system_multiply_component(const pal_system *system, const pal_component *component, double k, const double *p,
+                                   double *out);
 /* out = -df/dx p of the internal forces at x by central difference: the true stiffness, which may be indefinite.
  * Sets body->x to x, overwrites body->f and g; low is work space; out is 0 at fixed dofs */
 void pal_system_true_stiffness(const pal_system *system, const double *x, double *low, const double *p, double *out);

@@ -24,7 +24,7 @@ static pal_err run(void *self, pal_step *step)
     memcpy(core->vs, core->v0, n_byte);
     do {
         memcpy(body->x, core->x0, n_byte);
-        PAL_TRY(pal_implicit_stage(core, step, step->dt_s));
+        PAL_TRY(pal_implicit_stage(core, step, step->dt_s, true));
     } while (pal_implicit_settle(core, step, true));
     pal_implicit_end(core, step);
     return PAL_ERR_OK;

@@ -52,13 +52,13 @@ static pal_err run(void *self, pal_step *step)
         memcpy(core->vs, core->v0, n_byte);
         two_stages = core->rose_s <= 0;
         if (!two_stages) { /* backward Euler over the whole step, see above */
-            PAL_TRY(pal_implicit_stage(core, step, step->dt_s));
+            PAL_TRY(pal_implicit_stage(core, step, step->dt_s, true));
         } else {
-            PAL_TRY(pal_implicit_stage(core, step, GAMMA * step->dt_s));
+            PAL_TRY(pal_implicit_stage(core, step, GAMMA * step->dt_s, false));
             if (pal_implicit_settle(core, step, false)) continue;
             for (int t = 0; t < tools->n_tool; t++) pal_copy3(first_N[t], tools->tool[t].force_N);
             open_second(core, body, step->dt_s);
-            PAL_TRY(pal_implicit_stage(core, step, GAMMA * step->dt_s));
+            PAL_TRY(pal_implicit_stage(core, step, GAMMA * step->dt_s, false));
         }
         again = pal_implicit_settle(core, step, true);
     }

@@ -396,6 +396,7 @@ static pal_err solve_linear(static_newton *solver, double size)
     memset(solver->move, 0, pal_body_bytes3(solver->system.body));
     const bool renews = solver->linear == LINEAR_AUTO || solver->linear == LINEAR_MULTIGRID;
     if (!solver->has_factor || fresh || (renews && (solver->stale || solver->eager))) PAL_TRY(factor(solver));
+    (void)pal_preconditioner_follow(&solver->preconditioner);
     pal_preconditioner_rotate(&solver->preconditioner);
     double before = pal_clock_s();
     if (direct)
@@ -518,7 +519,6 @@ static pal_err solve(static_newton *solver, pal_step *step, bool *bad)
     if (solver->sampled != pal_dofs_material_revision(&body->dofs)) solver->has_factor = false;
     if (solver->part == 0) solver->part = 1;
     PAL_TRY(find_rest(solver, step));
-    if (solver->compliance.hook.solve) pal_preconditioner_rotate(&solver->compliance.preconditioner);
     *bad = !pal_guard_check_finite(body);
     if (*bad) memcpy(body->x, solver->x0, pal_body_bytes3(solver->system.body));
     pal_body_update_nodes(body);
@@ -571,7 +571,6 @@ static void reset(void *self, const pal_body *body)
     if (solver->system.n_free == 0) return;
     pal_node_rotations_reset(&solver->rotations);
     pal_compliance_solver_reset(&solver->compliance);
-    if (solver->compliance.hook.solve) pal_preconditioner_rotate(&solver->compliance.preconditioner);
     /* the factor is of another state: rebuild it when it is needed */
     if (solver->linear != LINEAR_PCG && solver->preconditioner.n_update > 1) solver->has_factor = false;
 }

@@ -493,7 +493,7 @@ static void check_applications(bool stiff)
         pal_system_linearise(&o.system);
         pal_node_rotations_update(&o.rotations, &o.system);
         if (turn == 0) REQUIRE(!pal_preconditioner_update(&o.p));
-        pal_preconditioner_rotate(&o.p);
+        (void)pal_preconditioner_follow(&o.p), pal_preconditioner_rotate(&o.p);
         uint64_t seed = 5;
         double rz, sq, rq, sz, rr = 0;
         for (int trial = 0; trial < 3; trial++) {
@@ -552,8 +552,10 @@ static bool same_bits(beside *a, beside *o, const fem_beam *b, uint64_t *seed)
     if (!r) return false;
     for (size_t i = 0; i < n; i++) r[i] = random_signed(seed);
     pal_system_clear_supported(b->body, r);
-    pal_preconditioner_rotate(&a->p), pal_preconditioner_solve(&a->p, PAL_CYCLE_V, r, y);
-    pal_preconditioner_rotate(&o->p), pal_preconditioner_solve(&o->p, PAL_CYCLE_V, r, z);
+    (void)pal_preconditioner_follow(&a->p), pal_preconditioner_rotate(&a->p),
+        pal_preconditioner_solve(&a->p, PAL_CYCLE_V, r, y);
+    (void)pal_preconditioner_follow(&o->p), pal_preconditioner_rotate(&o->p),
+        pal_preconditioner_solve(&o->p, PAL_CYCLE_V, r, z);
     double size = 0;
     for (size_t i = 0; i < n; i++) size += y[i] * y[i];
     const bool same = memcmp(y, z, n * sizeof *y) == 0 && size > 0;

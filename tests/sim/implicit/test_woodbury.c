@@ -136,7 +136,7 @@ static void bend(held_beam *h)
     }
     pal_system_linearise(&h->system);
     pal_node_rotations_update(&h->rotations, &h->system);
-    pal_preconditioner_rotate(&h->m);
+    (void)pal_preconditioner_follow(&h->m), pal_preconditioner_rotate(&h->m);
 }
 
 static void randomise(const held_beam *h, uint64_t *seed, double *to)

@@ -203,9 +203,10 @@ static void a_step_calls_no_heap(void)
 }
 
 /* refreshed factors come into use at steps that do not depend on the clock, and a reset forgets them */
-/* without loads nothing is left to compare a residual with but rounding: the one iteration that every solve begins with
- * is all, and no step looks as if it gained energy */
-static void a_body_at_rest_without_loads_takes_one_iteration_a_solve(void)
+/* without loads nothing is left to compare a residual with but rounding: a body that is as near to rest takes no
+ * iteration, and no step looks as if it gained energy. Forces of PAL_UNLOADED_FLOOR move a node by 1e-11 of an edge
+ * where a cube bears them, and a slender beam's end by (L/h)^3 times as much at most */
+static void a_body_at_rest_without_loads_takes_no_iteration(void)
 {
     static const char *const solver[] = {"implicit_euler", "sdirk2"};
     for (int k = 0; k < 2; k++) {
@@ -228,8 +229,8 @@ static void a_body_at_rest_without_loads_takes_one_iteration_a_solve(void)
         for (int i = 0; i < 3 * b.body->n_dof; i++) off = fmax(off, fabs(b.body->x[i] - b.body->x_rest[i]));
         printf("  %s: %d iterations in 60 steps, %d searches, %.1e of S off rest\n", solver[k], n_cg,
                (int)b.body->safeguards.n_search, off / b.body->length_scale_m);
-        CHECK(n_cg <= 60 * (k + 1));
-        CHECK(off < 1e-11 * b.body->length_scale_m);
+        CHECK_INT(n_cg, 0);
+        CHECK(off < 1e-9 * b.body->length_scale_m);
         CHECK_INT(b.body->safeguards.n_search, 0);
         beam_free(&b);
     }
@@ -405,7 +406,7 @@ int main(void)
     RUN_LONG(the_beam_swings_at_its_own_frequency);
     RUN(long_steps_stay_bounded_and_come_to_rest);
     RUN(a_step_calls_no_heap);
-    RUN(a_body_at_rest_without_loads_takes_one_iteration_a_solve);
+    RUN(a_body_at_rest_without_loads_takes_no_iteration);
     RUN(a_run_with_refreshed_factors_repeats);
     RUN(a_refreshed_factor_saves_iterations);
     RUN(all_held_and_one_element_are_fine);
