@@ -58,6 +58,7 @@ static double elements_energy(pal_elastic_hexes *hexes, const pal_body *body)
     double sum = hexes->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_run(hexes, body->node_order, what)
                                                    : pal_hex_corot_run(hexes, body->node_order, what);
     if (forces) pal_node_order_add(body->node_order, forces);
+    hexes->turned = forces && hexes->law == PAL_LAW_COROTATIONAL;
     return pal_force_cache_commit(&hexes->force_cache, sum);
 }
 
@@ -114,9 +115,14 @@ static bool couple(void *self, pal_cliques *out)
 static void linearise(void *self, const pal_body *body)
 {
     pal_elastic_hexes *hexes = self;
+    pal_node_order *order = body->node_order;
     pal_recovery_select(hexes->recovery, body);
-    pal_node_order_load(body->node_order, body->d);
-    (hexes->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_linearise : pal_hex_corot_linearise)(hexes, body->node_order);
+    if (hexes->turned && pal_force_cache_matches(&hexes->force_cache, body->d)) order = NULL;
+    if (order) pal_node_order_load(order, body->d);
+    if (hexes->law == PAL_LAW_NEO_HOOKEAN)
+        pal_hex_neo_linearise(hexes, order);
+    else
+        pal_hex_corot_linearise(hexes, order, body->team);
 }
 
 static void multiply(void *self, const pal_body *body, double k, const double *p, double *out)

@@ -59,6 +59,7 @@ typedef struct pal_elastic_hexes {
     double *tangent;     /* neo_hookean: K in modes at the last linearise    [n_block][231][8]; NULL: not kept */
 
     pal_force_cache force_cache; /* implicit: of the cubes, not of regions */
+    bool turned;                 /* q is that of the positions of force_cache; corotational */
 
     const pal_ground *ground; /* that the elements stick to, borrowed; NULL: none */
 
@@ -120,7 +121,8 @@ void pal_hex_weights(const pal_elastic_hexes *cubes, int lane, double weight[8])
 void pal_hex_corot_bound(const pal_elastic_hexes *cubes, double *bound_N_m);
 /* cubes->row: what the explicit bound of a cut element's corners needs, which its rotation leaves */
 void pal_hex_corot_find_rows(pal_elastic_hexes *cubes);
-void pal_hex_corot_linearise(pal_elastic_hexes *cubes, pal_node_order *node_order);
+/* order NULL: the positions are those of q */
+void pal_hex_corot_linearise(pal_elastic_hexes *cubes, pal_node_order *order, pal_team *team);
 void pal_hex_corot_multiply(pal_elastic_hexes *cubes, pal_node_order *node_order, double k);
 /* the tangent's blocks of 8 elements, k K: to [36][9][8] */
 void pal_hex_corot_blocks(const pal_elastic_hexes *cubes, int block, double k, double *to);

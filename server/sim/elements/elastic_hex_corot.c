@@ -133,6 +133,7 @@ double pal_hex_corot_run(pal_elastic_hexes *cubes, pal_node_order *node_order, p
 {
     pass p = {.cubes = cubes, .node_order = node_order, .what = what};
     double sum_J = 0;
+    cubes->turned = false;
     pal_block_rounds_run(&cubes->rounds, node_order->team, run_part, &p);
     for (int k = 0; k < cubes->rounds.part[cubes->rounds.n_round]; k++) sum_J += cubes->part_energy_J[k];
     return sum_J;
@@ -145,20 +146,26 @@ static void linearise_part(void *user, int part)
     for (int i = cubes->rounds.first[part]; i < cubes->rounds.first[part + 1]; i++) {
         const int b = cubes->rounds.order[i];
         pal_block_view v;
-        pal_block_open(&cubes->simd_blocks, p->node_order, b, 8, &v);
+        if (p->node_order) pal_block_open(&cubes->simd_blocks, p->node_order, b, 8, &v);
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
-            pal_wide u[3][8], r[9];
-            hex_modes(&v, l, u);
-            hex_turn_block(cubes, b, l, u, r);
+            pal_wide u[3][8], r[9], q[4];
+            if (p->node_order) {
+                hex_modes(&v, l, u);
+                hex_turn_block(cubes, b, l, u, r);
+            } else {
+                pal_wide_load_n(cubes->q + 4 * b * PAL_LANES + l, 4, q);
+                pal_wide_rotation(q, r);
+            }
             pal_wide_store_n(cubes->rotation + 9 * b * PAL_LANES + l, 9, r);
         }
     }
 }
 
-void pal_hex_corot_linearise(pal_elastic_hexes *cubes, pal_node_order *node_order)
+void pal_hex_corot_linearise(pal_elastic_hexes *cubes, pal_node_order *order, pal_team *team)
 {
-    pass p = {.cubes = cubes, .node_order = node_order};
-    if (cubes->law != PAL_LAW_LINEAR) pal_block_rounds_run(&cubes->rounds, node_order->team, linearise_part, &p);
+    pass p = {.cubes = cubes, .node_order = order};
+    cubes->turned = cubes->turned && !order;
+    if (cubes->law != PAL_LAW_LINEAR) pal_block_rounds_run(&cubes->rounds, team, linearise_part, &p);
 }
 
 PAL_INLINE void multiply_block(const pass *p, int b, bool turned, bool cut)
