@@ -106,14 +106,16 @@ void pal_compliance_solver_reset(pal_compliance_solver *solver)
     for (int k = 0; k < PAL_COMPLIANCE_CACHE; k++) solver->known[k].size2 = 0;
 }
 
-static pal_err make_arrays(pal_compliance_solver *solver, const pal_conjugate_gradient *of, pal_arena *arena)
+static pal_err make_arrays(pal_compliance_solver *solver, const pal_conjugate_gradient *of, double *work,
+                           pal_arena *arena)
 {
     const pal_body *body = solver->system->body;
     pal_conjugate_gradient *cg = &solver->cg;
     size_t n3 = 3 * (size_t)body->n_dof;
-    bool made = PAL_NEW_DOUBLES(arena, n3, &solver->x, &solver->low) &&
+    bool made = PAL_NEW_DOUBLES(arena, n3, &solver->x) && (work || PAL_NEW_DOUBLES(arena, n3, &solver->low)) &&
                 PAL_NEW_DOUBLES(arena, 3 * (size_t)body->n_node, &solver->f) &&
                 (!body->interpolation || PAL_NEW_DOUBLES(arena, n3, &solver->move));
+    if (work) solver->low = work;
     cg->r = of->r, cg->z = of->z, cg->p = of->p, cg->q = of->q;
     for (int k = 0; k < PAL_COMPLIANCE_CACHE && made; k++) {
         solver->known[k].force = PAL_NEW(arena, float, n3), solver->known[k].move = PAL_NEW(arena, float, n3);
@@ -140,8 +142,8 @@ pal_err pal_compliance_solver_update(pal_compliance_solver *solver, bool later)
     return err;
 }
 
-pal_err pal_compliance_solver_make(const pal_preconditioner *like, const pal_conjugate_gradient *cg, pal_arena *arena,
-                                   pal_compliance_solver *out)
+pal_err pal_compliance_solver_make(const pal_preconditioner *like, const pal_conjugate_gradient *cg, double *work,
+                                   pal_arena *arena, pal_compliance_solver *out)
 {
     pal_system *system = like->system;
     pal_body *body = system->body;
@@ -151,7 +153,7 @@ pal_err pal_compliance_solver_make(const pal_preconditioner *like, const pal_con
     PAL_TRY(pal_system_find_supports(system, &supports));
     if (supports.n_unsupported > 0) return PAL_ERR_OK;
     out->system = system;
-    PAL_TRY(make_arrays(out, cg, arena));
+    PAL_TRY(make_arrays(out, cg, work, arena));
     const pal_preconditioner_options options = {.single = true, .like = like};
     PAL_TRY(pal_preconditioner_make(&options, system, like->rotations, arena, NULL, &out->preconditioner));
     pal_err err = pal_compliance_solver_update(out, false);

@@ -32,11 +32,11 @@ typedef struct pal_compliance_solver {
     uint64_t n_call;
 } pal_compliance_solver;
 
-/* The components are linearised at rest. like, cg: the solver's; vectors of cg are work space here, while the solver
- * solves nothing: in CONTACT components and their settle. Nothing is published when no component
- * wants it or when the supports leave a rigid motion free. MEMORY. [load] */
-pal_err pal_compliance_solver_make(const pal_preconditioner *like, const pal_conjugate_gradient *cg, pal_arena *arena,
-                                   pal_compliance_solver *out);
+/* The components are linearised at rest. like, cg: the solver's; vectors of cg, and work [n_dof][3] (NULL: its own),
+ * are work space here, while the solver solves nothing: in CONTACT components and their settle. Nothing is published
+ * when no component wants it or when the supports leave a rigid motion free. MEMORY. [load] */
+pal_err pal_compliance_solver_make(const pal_preconditioner *like, const pal_conjugate_gradient *cg, double *work,
+                                   pal_arena *arena, pal_compliance_solver *out);
 /* takes the components' present linearisation at rest, after a material edit; later: on a spare thread */
 pal_err pal_compliance_solver_update(pal_compliance_solver *solver, bool later);
 void pal_compliance_solver_reset(pal_compliance_solver *solver); /* the body is back at rest */

@@ -56,13 +56,16 @@ static void precondition(void *user, const double *r, double *z)
         pal_preconditioner_solve(&core->preconditioner, cycle, r, z);
 }
 
-static pal_err make_arrays(pal_implicit *core, pal_arena *arena)
+static pal_err make_arrays(pal_implicit *core, bool alone, pal_arena *arena)
 {
     const pal_body *body = core->system.body;
     pal_conjugate_gradient *cg = &core->cg;
     size_t n3 = 3 * (size_t)body->n_dof;
-    bool made = PAL_NEW_DOUBLES(arena, n3, &core->x0, &core->v0, &core->xs, &core->vs, &core->start, &core->work,
-                                &core->moved, &cg->r, &cg->z, &cg->p, &cg->q);
+    bool made = PAL_NEW_DOUBLES(arena, n3, &core->x0, &core->v0, &core->start, &core->work, &core->moved, &cg->r) &&
+                (alone || PAL_NEW_DOUBLES(arena, n3, &core->xs, &core->vs)) &&
+                PAL_NEW_DOUBLES(arena, 3 * n3, &cg->z); /* one array, in which rotations are summed */
+    if (made) cg->p = cg->z + n3, cg->q = cg->p + n3;
+    if (alone) core->xs = core->x0, core->vs = core->v0;
     core->node_displacement_m = core->moved;
     if (made && body->interpolation)
         made = PAL_NEW_DOUBLES(arena, 3 * (size_t)body->n_node, &core->node_displacement_m);
@@ -105,16 +108,17 @@ pal_err pal_implicit_make(pal_config_entry *item, pal_build *build, double share
     core->tau_rest_s = share * fmin(build->scene->step_s, core->options.substep_s);
     core->density = build->def->material.density_kg_m3;
     PAL_TRY(pal_system_make(build, &core->system));
-    PAL_TRY(make_arrays(core, build->arena));
+    PAL_TRY(make_arrays(core, share == 1, build->arena));
     if (core->system.n_free == 0) return PAL_ERR_OK;
-    PAL_TRY(pal_node_rotations_make(&core->system, build->arena, &core->rotations));
+    PAL_TRY(pal_node_rotations_make(&core->system, core->cg.z, build->arena, &core->rotations));
     core->rotations.any &= core->options.warp;
     const pal_preconditioner_options options = {.kind = core->options.preconditioner, .single = true};
     PAL_TRY(pal_preconditioner_make(&options, &core->system, &core->rotations, build->arena, build->diag,
                                     &core->preconditioner));
     PAL_TRY(pal_woodbury_make(&core->system, build->made, build->n_made, build->arena, &core->woodbury));
     pal_err err = factor_at_rest(core);
-    if (!err) err = pal_compliance_solver_make(&core->preconditioner, &core->cg, build->arena, &core->compliance);
+    if (!err)
+        err = pal_compliance_solver_make(&core->preconditioner, &core->cg, core->work, build->arena, &core->compliance);
     if (err == PAL_ERR_NUMERIC)
         return PAL_REFUSE(build->diag,
                           "body \"%s\": mass and stiffness at rest for steps of %g s make no positive definite matrix",
@@ -483,6 +487,16 @@ static pal_err iterate_contact(pal_implicit *core, pal_step *step, double tau, d
     return PAL_ERR_OK;
 }
 
+/* core->moved after contact was settled, which took it: the residual at `start` again */
+static pal_err restore_residual(pal_implicit *core, pal_step *step, double tau)
+{
+    core->settled = false;
+    set_positions(core, tau, core->start);
+    PAL_TRY(pal_assemble_forces(step));
+    (void)residual(core, tau, core->start, core->moved);
+    return PAL_ERR_OK;
+}
+
 pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau, bool alone)
 {
     pal_body *body = core->system.body;
@@ -533,7 +547,7 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau, bool 
         if (core->energy_rose && !rises(core, PAL_SOLVER_TOLERANCE)) return PAL_ERR_OK;
         again_ns = pal_clock_ns();
         body->safeguards.n_search++;
-        core->settled = false;
+        if (core->settled) PAL_TRY(restore_residual(core, step, tau));
         line_search(core, tau);
         if (max++ < PAL_SAFEGUARD_NEWTON) continue;
         core->energy_rose = rises(core, 0);

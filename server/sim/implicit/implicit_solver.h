@@ -47,7 +47,7 @@ typedef struct pal_implicit {
     pal_compliance_solver compliance; /* compliance.hook.solve NULL: not wanted or not available */
     pal_conjugate_gradient cg;
     double *x0, *v0; /* at the beginning of the sub-step [n_dof][3] */
-    double *xs, *vs; /* x*, v* of the stage, filled by the solver [n_dof][3] */
+    double *xs, *vs; /* x*, v* of the stage, filled by the solver; x0, v0 where it has one stage [n_dof][3] */
     double *start;   /* V that keeps the body where it was linearised [n_dof][3] */
     double *work, *moved;
     double *node_displacement_m; /* displacement of nodes for `settle`; `moved` without interpolation [n_node][3] */

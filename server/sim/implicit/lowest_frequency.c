@@ -82,7 +82,7 @@ static pal_err coarsen(search *s, const pal_build *build)
     if (!pal_preconditioner_suits_multigrid(&s->system)) return PAL_ERR_REFUSED;
     s->system.mass = 0, s->system.stiff = 1, s->system.damp = 0;
     pal_system_linearise_rest(&s->system);
-    PAL_TRY(pal_node_rotations_make(&s->system, build->arena, &s->rotations));
+    PAL_TRY(pal_node_rotations_make(&s->system, NULL, build->arena, &s->rotations));
     PAL_TRY(pal_preconditioner_make(&options, &s->system, &s->rotations, build->arena, &diag, &s->multigrid));
     s->coarsens = true;
     PAL_TRY(pal_preconditioner_update(&s->multigrid));

@@ -121,7 +121,7 @@ pal_err pal_preconditioner_make(const pal_preconditioner_options *options, pal_s
     if (out->kind == PAL_PRECONDITION_AUTO) PAL_TRY(choose(out, cubes, arena));
     const bool multigrid = out->kind == PAL_PRECONDITION_MULTIGRID;
     if (!multigrid && !PAL_NEW_DOUBLES(arena, 3 * n, &out->work)) return PAL_ERR_MEMORY;
-    if (!(multigrid && like) && !PAL_NEW_DOUBLES(arena, 4 * n, &out->next)) return PAL_ERR_MEMORY;
+    if (!(multigrid && like) && !(out->next = PAL_NEW(arena, float, 4 * n))) return PAL_ERR_MEMORY;
     switch (out->kind) {
     case PAL_PRECONDITION_MULTIGRID:
         return make_multigrid(out, cubes, like, arena, diag);
@@ -173,7 +173,7 @@ static pal_err update(pal_preconditioner *p, bool pending)
     if (p->kind == PAL_PRECONDITION_INCOMPLETE) return pal_incomplete_cholesky_factor(&p->incomplete, &p->blocks);
     /* the factor in the making is the one in use if this one fails */
     if (pending && !pal_cholesky_adopt(p->factor))
-        memcpy(p->warp.base, p->next, 4 * sizeof(double) * (size_t)p->warp.n_dof);
+        memcpy(p->warp.base, p->next, 4 * sizeof *p->next * (size_t)p->warp.n_dof);
     return pal_cholesky_factor(p->factor, &p->blocks, p->single);
 }
 
@@ -186,7 +186,7 @@ pal_err pal_preconditioner_update(pal_preconditioner *p)
     if (err) return err;
     p->n_update++;
     p->refreshed = p->warp.rotated = false, p->turn_rad = INFINITY;
-    memcpy(p->warp.base, p->rotations->quat, 4 * sizeof(double) * (size_t)p->warp.n_dof);
+    pal_warp_keep(p->rotations, p->warp.base);
     return PAL_ERR_OK;
 }
 
@@ -223,7 +223,7 @@ bool pal_preconditioner_refresh(pal_preconditioner *p, bool at_rest)
     } else {
         return false;
     }
-    memcpy(p->next, p->rotations->quat, 4 * sizeof(double) * (size_t)p->warp.n_dof);
+    pal_warp_keep(p->rotations, p->next);
     if (at_rest) pal_warp_rest(p->next, p->warp.n_dof);
     p->pending = true;
     p->left_s = flops / PAL_REFRESH_FLOPS;
@@ -237,7 +237,7 @@ void pal_preconditioner_step(pal_preconditioner *p, double dt_s)
     p->pending = false, p->left_s = PAL_PAUSE_S;
     if (p->kind == PAL_PRECONDITION_MULTIGRID ? pal_hex_multigrid_adopt(&p->multigrid) : pal_cholesky_adopt(p->factor))
         return;
-    memcpy(p->warp.base, p->next, 4 * sizeof(double) * (size_t)p->warp.n_dof);
+    memcpy(p->warp.base, p->next, 4 * sizeof *p->next * (size_t)p->warp.n_dof);
     p->n_update++;
     p->refreshed = true, p->turn_rad = INFINITY;
 }

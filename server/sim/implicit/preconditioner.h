@@ -41,7 +41,7 @@ typedef struct pal_preconditioner {
     pal_hex_multigrid multigrid;
     double *inverse; /* jacobi [n_dof][9] */
     double *work;    /* [n_dof][3]; NULL: multigrid */
-    double *next;    /* quat of those in progress [n_dof][4]; NULL: levels that are shared */
+    float *next;     /* quat of those in progress [n_dof][4]; NULL: levels that are shared */
     double turn_rad; /* of the elements since the warp was found, RMS, at most; infinite: it is of another base */
     bool single;     /* the factor is in single precision */
     bool refreshed;  /* factor or levels are newer than the last update */

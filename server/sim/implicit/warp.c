@@ -11,17 +11,22 @@
 /* dofs of a piece of work of a thread, a multiple of PAL_WIDE: some ten microseconds */
 enum { DOFS = 512 };
 
-void pal_warp_rest(double *quat, int n_dof)
+void pal_warp_rest(float *quat, int n_dof)
 {
     for (int i = 0; i < 4 * n_dof; i++) quat[i] = i % 4 == 0;
 }
 
-pal_err pal_node_rotations_make(const pal_system *system, pal_arena *arena, pal_node_rotations *out)
+void pal_warp_keep(const pal_node_rotations *rotations, float *quat)
+{
+    for (int i = 0; i < 4 * rotations->n_dof; i++) quat[i] = (float)rotations->quat[i];
+}
+
+pal_err pal_node_rotations_make(const pal_system *system, double *work, pal_arena *arena, pal_node_rotations *out)
 {
     int n = system->body->n_dof;
     *out = (pal_node_rotations){.n_dof = n, .any = system->has_rotation};
     out->quat = PAL_NEW(arena, double, 4 * (size_t)n);
-    out->sum = PAL_NEW(arena, double, system->has_rotation ? 9 * (size_t)n : 0);
+    out->sum = work ? work : PAL_NEW(arena, double, system->has_rotation ? 9 * (size_t)n : 0);
     if (!out->quat || !out->sum) return PAL_ERR_MEMORY;
     pal_node_rotations_reset(out);
     return PAL_ERR_OK;
@@ -29,7 +34,7 @@ pal_err pal_node_rotations_make(const pal_system *system, pal_arena *arena, pal_
 
 void pal_node_rotations_reset(pal_node_rotations *rotations)
 {
-    pal_warp_rest(rotations->quat, rotations->n_dof);
+    for (int i = 0; i < 4 * rotations->n_dof; i++) rotations->quat[i] = i % 4 == 0;
 }
 
 /* a piece of the dofs */
@@ -65,8 +70,8 @@ pal_err pal_warp_make(const pal_node_rotations *rotations, pal_arena *arena, pal
 {
     size_t n = (size_t)rotations->n_dof;
     *out = (pal_warp){.n_dof = rotations->n_dof};
-    out->w = PAL_NEW(arena, float, 9 * n);
-    if (!PAL_NEW_DOUBLES(arena, 4 * n, &out->base) || !out->w) return PAL_ERR_MEMORY;
+    out->w = PAL_NEW(arena, float, 9 * n), out->base = PAL_NEW(arena, float, 4 * n);
+    if (!out->w || !out->base) return PAL_ERR_MEMORY;
     pal_warp_rest(out->base, out->n_dof);
     return PAL_ERR_OK;
 }
@@ -84,7 +89,9 @@ static void warp_dofs(void *user, int worker, int index)
     (void)worker;
     for (int i = first; i < end; i++) {
         /* quat times the conjugate of base */
-        const double *a = pass->rotations->quat + 4 * i, *b = warp->base + 4 * i;
+        const double *a = pass->rotations->quat + 4 * i;
+        double b[4];
+        for (int k = 0; k < 4; k++) b[k] = (double)warp->base[4 * i + k];
         const double q[4] = {a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3],
                              -a[0] * b[1] + a[1] * b[0] - a[2] * b[3] + a[3] * b[2],
                              -a[0] * b[2] + a[1] * b[3] + a[2] * b[0] - a[3] * b[1],

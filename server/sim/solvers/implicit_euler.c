@@ -20,8 +20,6 @@ static pal_err run(void *self, pal_step *step)
     pal_body *body = step->body;
     const size_t n_byte = pal_body_bytes3(body);
     if (!pal_implicit_begin(core, step)) return PAL_ERR_OK;
-    memcpy(core->xs, core->x0, n_byte);
-    memcpy(core->vs, core->v0, n_byte);
     do {
         memcpy(body->x, core->x0, n_byte);
         PAL_TRY(pal_implicit_stage(core, step, step->dt_s, true));

@@ -220,7 +220,7 @@ static pal_err make_factors(static_newton *solver, pal_build *build)
                           "control points; take \"pcg\"",
                           body->name, solver->linear == LINEAR_DIRECT ? "direct" : "incomplete");
     if (body->interpolation) solver->linear = LINEAR_PCG;
-    PAL_TRY(pal_node_rotations_make(&solver->system, build->arena, &solver->rotations));
+    PAL_TRY(pal_node_rotations_make(&solver->system, NULL, build->arena, &solver->rotations));
     static const pal_precondition kind[] = {
         [LINEAR_AUTO] = PAL_PRECONDITION_AUTO,           [LINEAR_DIRECT] = PAL_PRECONDITION_FACTOR,
         [LINEAR_PCG] = PAL_PRECONDITION_FACTOR,          [LINEAR_INCOMPLETE] = PAL_PRECONDITION_INCOMPLETE,
@@ -232,7 +232,8 @@ static pal_err make_factors(static_newton *solver, pal_build *build)
     pal_system_linearise(&solver->system);
     if (solver->relieved) PAL_TRY(choose_shift(solver));
     pal_err err = solver->linear == LINEAR_DIRECT ? PAL_ERR_OK : factor(solver);
-    if (!err) err = pal_compliance_solver_make(&solver->preconditioner, &solver->cg, build->arena, &solver->compliance);
+    if (!err)
+        err = pal_compliance_solver_make(&solver->preconditioner, &solver->cg, NULL, build->arena, &solver->compliance);
     if (err == PAL_ERR_NUMERIC)
         return PAL_REFUSE(build->diag, "body \"%s\": its stiffness at rest is not positive definite", body->name);
     return err;

@@ -468,7 +468,7 @@ static void beside_make(beside *o, const fem_beam *b)
                              .made = elastic,
                              .n_made = 1};
     REQUIRE(!pal_system_make(&build, &o->system));
-    REQUIRE(!pal_node_rotations_make(&o->system, o->arena, &o->rotations));
+    REQUIRE(!pal_node_rotations_make(&o->system, NULL, o->arena, &o->rotations));
     const pal_preconditioner_options options = {.kind = PAL_PRECONDITION_MULTIGRID};
     REQUIRE(!pal_preconditioner_make(&options, &o->system, &o->rotations, o->arena, &diag, &o->p));
 }

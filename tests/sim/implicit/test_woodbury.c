@@ -108,7 +108,7 @@ static void make(held_beam *h, int n_spring)
     const pal_preconditioner_options options = {.kind = PAL_PRECONDITION_FACTOR};
     const size_t n = 3 * (size_t)h->b.body->n_dof;
     REQUIRE(!pal_system_make(&build, &h->system));
-    REQUIRE(!pal_node_rotations_make(&h->system, h->arena, &h->rotations));
+    REQUIRE(!pal_node_rotations_make(&h->system, NULL, h->arena, &h->rotations));
     REQUIRE(!pal_preconditioner_make(&options, &h->system, &h->rotations, h->arena, &diag, &h->m));
     REQUIRE(!pal_woodbury_make(&h->system, &h->contact, 1, h->arena, &h->woodbury));
     REQUIRE(PAL_NEW_DOUBLES(h->arena, n, &h->x, &h->r, &h->s, &h->z, &h->q, &h->cg.r, &h->cg.z, &h->cg.p, &h->cg.q));
