@@ -44,6 +44,7 @@ pal_err pal_hex_single_make(const pal_elastic_hexes *cubes, const pal_body *body
     *out =
         (pal_elastic_hexes_single){.cubes = cubes, .n_slot = body->node_order->n_slot, .slot = body->node_order->slot};
     out->stiff = PAL_NEW(arena, float, 2 * n);
+    out->acting = cubes->recovery ? PAL_NEW(arena, float, 2 * n) : out->stiff;
     if (cubes->law != PAL_LAW_LINEAR) {
         out->rotation = PAL_NEW(arena, float, 9 * n);
         if (!PAL_NEW_DOUBLES(arena, (size_t)count_pieces(cubes), &out->turned)) return PAL_ERR_MEMORY;
@@ -53,7 +54,8 @@ pal_err pal_hex_single_make(const pal_elastic_hexes *cubes, const pal_body *body
     if (n_cut > 0 && !(out->weight = PAL_NEW(arena, float, 8 * PAL_LANES * (size_t)n_cut))) return PAL_ERR_MEMORY;
     for (int i = 0; i < 8 * PAL_LANES * n_cut; i++) out->weight[i] = (float)cubes->weight[i];
     out->whole = pal_arena_array(arena, 2, sizeof *out->whole);
-    if (!out->whole || !out->stiff || !(out->rotation || cubes->law == PAL_LAW_LINEAR)) return PAL_ERR_MEMORY;
+    if (!out->whole || !out->stiff || !out->acting || !(out->rotation || cubes->law == PAL_LAW_LINEAR))
+        return PAL_ERR_MEMORY;
     for (int part = 0; part < 2; part++) {
         double block[36][9];
         for (int i = 0; i < 36 * 9; i++) block[i / 9][i % 9] = cubes->reference[i / 9][part][i % 9];
@@ -67,6 +69,13 @@ static const double *coefficients(const pal_elastic_hexes *cubes, int part)
     return cubes->recovery ? cubes->whole[part] : part == 0 ? cubes->mu : cubes->lambda;
 }
 
+static void act_as_elements(pal_elastic_hexes_single *single)
+{
+    single->softened = false;
+    if (single->acting != single->stiff)
+        memcpy(single->acting, single->stiff, sizeof *single->stiff * 2 * PAL_LANES * (size_t)single->cubes->n_block);
+}
+
 void pal_hex_single_stiffen(pal_elastic_hexes_single *single)
 {
     for (int part = 0; part < 2; part++) {
@@ -74,6 +83,23 @@ void pal_hex_single_stiffen(pal_elastic_hexes_single *single)
         for (int b = 0; b < single->cubes->n_block; b++)
             for (int l = 0; l < PAL_LANES; l++)
                 single->stiff[(2 * b + part) * PAL_LANES + l] = (float)from[PAL_LANES * b + l];
+    }
+    act_as_elements(single);
+}
+
+/* the elements of regions as their edges are */
+static void soften(pal_elastic_hexes_single *single)
+{
+    const pal_elastic_hexes *cubes = single->cubes;
+    if (single->softened) act_as_elements(single);
+    for (int e = 0; e < cubes->n_hex && pal_recovery_acts(cubes->recovery); e++) {
+        const double scale = pal_recovery_scale(cubes->recovery, e);
+        const int place = cubes->simd_blocks.place[e];
+        float *at = single->acting + 2 * PAL_LANES * (place / PAL_LANES) + place % PAL_LANES;
+        if (scale < 0) continue;
+        const float mu = at[0], lambda = at[PAL_LANES], young = mu * (3 * lambda + 2 * mu) / (lambda + mu);
+        at[0] = 0.5F * (float)scale * young, at[PAL_LANES] = 0;
+        single->softened = true;
     }
 }
 
@@ -100,6 +126,7 @@ double pal_hex_single_rotate(pal_elastic_hexes_single *single, pal_team *team)
     const int n_piece = count_pieces(single->cubes);
     double sum = 0;
     if (!single->rotation) return 0;
+    soften(single);
     pal_team_run(team, n_piece, rotate_piece, single);
     for (int k = 0; k < n_piece; k++) sum += single->turned[k];
     /* a small turn by w changes R by skew(w) R, whose entries have the sum of squares 2 w.w */
@@ -172,8 +199,8 @@ PAL_INLINE void multiply_blocks(const product *to, const int32_t block[BLOCKS], 
     const pal_elastic_hexes_single *single = to->single;
     const float beta[2] = {(float)single->cubes->beta[0], (float)single->cubes->beta[1]},
                 twist = (float)single->cubes->twist;
-    const single_wide mu = to->k * load_own(single->stiff, block, 2, 0),
-                      lambda = to->k * load_own(single->stiff, block, 2, 1);
+    const single_wide mu = to->k * load_own(single->acting, block, 2, 0),
+                      lambda = to->k * load_own(single->acting, block, 2, 1);
     single_wide r[9];
     for (int i = 0; i < 3; i++) walsh(u[i]);
     for (int i = 0; i < 9 && turned; i++) r[i] = load_own(single->rotation, block, 9, i);

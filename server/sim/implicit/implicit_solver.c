@@ -439,25 +439,6 @@ static double begin_iteration(pal_implicit *core, double tau, bool first)
     return left;
 }
 
-/* rows of contact that touch nothing answer no motion, so neither this one, which none of their directions is across.
- * What is not the mean of fixed nodes chooses its rows */
-static void find_contact(pal_implicit *core)
-{
-    double *p = core->cg.p, *q = core->cg.q;
-    for (int i = 0; i < core->cg.n; i += 3) p[i] = 1, p[i + 1] = M_SQRT2, p[i + 2] = M_PI;
-    core->system.has_contact = core->chooses = false;
-    for (int k = 0; k < core->system.n_contact; k++) {
-        const pal_component *component = &core->system.contact[k];
-        bool acts = false;
-        if (!component->effect->tangent || !component->effect->tangent->multiply) continue;
-        memset(q, 0, pal_body_bytes3(core->system.body));
-        pal_system_multiply_component(&core->system, component, 1, p, q);
-        for (int i = 0; i < core->cg.n && !acts; i++) acts = q[i] != 0;
-        core->system.has_contact |= acts;
-        core->chooses |= acts && !component->effect->tangent->mean_springs;
-    }
-}
-
 /* true: contact has changed its loads after the last solve */
 static bool settle_contact(pal_implicit *core, pal_step *step, bool last)
 {
@@ -465,7 +446,7 @@ static bool settle_contact(pal_implicit *core, pal_step *step, bool last)
         return false;
     /* energy is judged by the loads of the last solve, and points that came to touch act in it */
     core->energy_rose = false;
-    find_contact(core);
+    pal_system_find_contact(&core->system, core->cg.p, core->cg.q);
     return true;
 }
 
@@ -473,12 +454,12 @@ static bool settle_contact(pal_implicit *core, pal_step *step, bool last)
  * which points touch */
 static pal_err iterate_contact(pal_implicit *core, pal_step *step, double tau, double tolerance, double left)
 {
-    for (bool rough = core->chooses;;) {
+    for (bool rough = core->system.chooses;;) {
         const double best = tolerance * core->reference;
         iterate(core, tau, rough ? fmax(best, PAL_ROUGH_TOLERANCE * left) : best);
         const bool changed = settle_contact(core, step, true);
         if (!changed && (!rough || core->cg.residual <= best)) break;
-        rough = changed && core->chooses;
+        rough = changed && core->system.chooses;
         set_positions(core, tau, core->start);
         PAL_TRY(pal_assemble_forces(step));
         left = begin_iteration(core, tau, true);
@@ -578,7 +559,7 @@ bool pal_implicit_begin(pal_implicit *core, pal_step *step)
     core->max_cg = 0;
     core->energy_rose = false;
     pal_system_linearise_contact(&core->system, step);
-    find_contact(core);
+    pal_system_find_contact(&core->system, core->cg.p, core->cg.q);
     step->drag_separate = true;
     double slack;
     core->guarded = core->options.watch && core->options.newton == 1 && core->system.has_energy;

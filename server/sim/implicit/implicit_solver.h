@@ -58,7 +58,6 @@ typedef struct pal_implicit {
     double start_energy_J;       /* at the beginning of the sub-step */
     bool guarded;                /* energy is checked, see above */
     bool sound;                  /* the last check found x and v finite */
-    bool chooses;                /* contact acts whose points may cease to touch */
     bool settled;                /* contact is, for the last solve */
     bool energy_rose;            /* the energy rose in this sub-step */
     double rose_s;               /* what is left of PAL_PAUSE_S since the last such sub-step */

@@ -181,10 +181,21 @@ void pal_system_multiply_contact(const pal_system *system, double k, const doubl
     if (system->has_contact) multiply_rows(system, system->contact, system->n_contact, k, p, out);
 }
 
-void pal_system_multiply_component(const pal_system *system, const pal_component *component, double k, const double *p,
-                                   double *out)
+void pal_system_find_contact(pal_system *system, double *p, double *q)
 {
-    multiply_rows(system, component, 1, k, p, out);
+    const int n = 3 * system->body->n_dof;
+    for (int i = 0; i < n; i += 3) p[i] = 1, p[i + 1] = M_SQRT2, p[i + 2] = M_PI;
+    system->has_contact = system->chooses = false;
+    for (int k = 0; k < system->n_contact; k++) {
+        const pal_tangent *tangent = system->contact[k].effect->tangent;
+        bool acts = false;
+        if (!tangent || !tangent->multiply) continue;
+        memset(q, 0, pal_body_bytes3(system->body));
+        multiply_rows(system, &system->contact[k], 1, 1, p, q);
+        for (int i = 0; i < n && !acts; i++) acts = q[i] != 0;
+        system->has_contact |= acts;
+        system->chooses |= acts && !tangent->mean_springs;
+    }
 }
 
 void pal_system_multiply_inertia(const pal_system *system, double mass, double damp, const double *p, double *out)

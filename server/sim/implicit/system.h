@@ -18,6 +18,7 @@ typedef struct pal_system {
     bool has_energy;                   /* every FORCE component except drag reports its energy */
     bool has_rotation;                 /* some component reports rotations */
     bool has_contact;                  /* some CONTACT component has a tangent */
+    bool chooses;                      /* one of them has points that may cease to touch */
     double mass, stiff, viscous, damp; /* coefficients of M, K (viscous: of damping proportional to K), D */
     double assemble_s;                 /* time in pal_system_assemble and pal_system_probe */
 } pal_system;
@@ -52,9 +53,9 @@ double pal_system_inertia_norm2(const pal_system *system, double mass, double da
 void pal_system_multiply_stiffness(const pal_system *system, double k, const double *p, double *out);
 /* out += k K p of contact alone */
 void pal_system_multiply_contact(const pal_system *system, double k, const double *p, double *out);
-/* out += k K p of one component alone */
-void pal_system_multiply_component(const pal_system *system, const pal_component *component, double k, const double *p,
-                                   double *out);
+/* has_contact, chooses: rows of contact that touch nothing answer no motion, so neither p, which none of their
+ * directions is across; p, q are work space [n_dof][3] */
+void pal_system_find_contact(pal_system *system, double *p, double *q);
 /* out = -df/dx p of the internal forces at x by central difference: the true stiffness, which may be indefinite.
  * Sets body->x to x, overwrites body->f and g; low is work space; out is 0 at fixed dofs */
 void pal_system_true_stiffness(const pal_system *system, const double *x, double *low, const double *p, double *out);

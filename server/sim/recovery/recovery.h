@@ -125,6 +125,11 @@ static inline bool pal_recovery_acts(const pal_recovery *r)
     return r && r->n_region > 0;
 }
 
+/* s of the region that element e is in; -1: it is in none */
+static inline double pal_recovery_scale(const pal_recovery *r, int e)
+{
+    return r->region[e] < 0 ? -1 : r->of[r->region[e]].scale;
+}
 /* the forces of the regions at the body's state, timed in body->safeguards */
 void pal_recovery_add_forces(pal_recovery *r, pal_body *body);
 /* Under an explicit solver, which does not damp by itself: forces against the motion of the edges in regions beside the
