@@ -50,7 +50,7 @@ static void a_pulled_and_stiffened_block_has_its_golden_hash(void)
     pal_prepared box;
     REQUIRE(!box_make(6, 4, 4, 0.01, &box));
     pal_scene *scene = box_scene(&box, true, true);
-    CHECK(run(&box, scene, pull_and_stiffen, 120) == 0x1378f78708335768u);
+    CHECK(run(&box, scene, pull_and_stiffen, 120) == 0xa98d3ed6ec58644du);
 }
 
 /* a block with nodes enough for every thread sags */
@@ -87,7 +87,7 @@ static void collapse(pal_world *world, int tick)
 static void a_collapsed_and_a_tumbling_body_have_their_golden_hash(void)
 {
     /* springs alone open again by their weight, and without it by their recovery */
-    static const uint64_t golden[] = {0x25fc76a9c1cd197cu, 0x91312b1563c0c3d0u};
+    static const uint64_t golden[] = {0x5f23d55a8654e4bau, 0x9aa2df1f4f6c2e79u};
     for (int recover = 0; recover < 2; recover++) {
         pal_prepared box;
         REQUIRE(!box_make(4, 3, 3, 0.01, &box));
@@ -125,7 +125,7 @@ static void a_pressed_and_grasped_block_has_its_golden_hash(void)
     pal_entry_init(&def->effect[def->n_effect++], "effects[3]", "tool_grasp");
     pal_tools_default(scene, 2);
     scene->tool[0].radius_m = scene->tool[1].radius_m = 0.006;
-    CHECK(run(&box, scene, press_and_grasp, 100) == 0x36d41565b114918au);
+    CHECK(run(&box, scene, press_and_grasp, 100) == 0x47b99168552e332cu);
 }
 
 /* our stomach, held at one end, on three levels: pressed at the front and grabbed beside it, both let go; levels come

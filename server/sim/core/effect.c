@@ -31,7 +31,7 @@ static pal_err run_each(pal_step *step, pal_forces which)
 pal_err pal_run_forces(pal_step *step, pal_forces which)
 {
     pal_node_order *order = step->body->node_order;
-    if (order) pal_node_order_begin(order);
+    if (order) pal_node_order_begin(order, step->single, step->body->d);
     const pal_err err = run_each(step, which);
     if (order) pal_node_order_end(order, step->body->f);
     return err;

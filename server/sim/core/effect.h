@@ -39,6 +39,7 @@ typedef struct pal_step {
     pal_component *adapt; /* ADAPT components of the body                                    [n_adapt]   */
     int n_adapt;
     bool drag_separate; /* set by a solver that applies drag itself: pal_assemble_forces omits those components  */
+    bool single;        /* set by a solver whose forces may be as exact as single precision (springs/spring_single.h) */
     bool finds_balance; /* set by a solver that goes from balance to balance, so that energy has no meaning between  */
     double dt_s;        /* length of this sub-step; of the whole step in ADAPT, GUARD, OUTPUT                     */
     double time_s;      /* at its end                                                                            */

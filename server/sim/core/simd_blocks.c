@@ -192,6 +192,23 @@ typedef struct node_pass {
     double *force; /* NULL: x is loaded */
 } node_pass;
 
+/* position of node i to its slot */
+PAL_INLINE void load_single(const pal_node_order *order, int i, const double *x)
+{
+    float *to = order->single_x + order->slot[i];
+    const double per_m = 1 / order->unit_m;
+    for (int d = 0; d < 3; d++) to[d * order->n_slot] = (float)(per_m * (x[3 * i + d] - order->origin_m[d]));
+}
+/* force [n_node][3] += the force at node i, which is zero afterwards */
+PAL_INLINE void take_single(const pal_node_order *order, int i, double *force)
+{
+    float *from = order->single_f + order->slot[i];
+    for (int d = 0; d < 3; d++) {
+        force[3 * i + d] += order->unit_N * (double)from[d * order->n_slot];
+        from[d * order->n_slot] = 0;
+    }
+}
+
 static void pass_nodes(void *user, int worker, int index)
 {
     const node_pass *pass = user;
@@ -199,7 +216,13 @@ static void pass_nodes(void *user, int worker, int index)
     double *at = pass->force ? order->f : order->x;
     const int first = index * NODES, end = first + NODES < order->n_node ? first + NODES : order->n_node;
     (void)worker;
-    for (int i = first; i < end; i++) {
+    for (int i = first; i < end && order->single; i++) {
+        if (pass->force)
+            take_single(order, i, pass->force);
+        else
+            load_single(order, i, pass->x);
+    }
+    for (int i = first; i < end && !order->single; i++) {
         double *x = at + order->slot[i], *y = x + order->n_slot, *z = y + order->n_slot;
         if (pass->force) {
             pass->force[3 * i] += *x, pass->force[3 * i + 1] += *y, pass->force[3 * i + 2] += *z;
@@ -324,6 +347,14 @@ void pal_block_rounds_run(const pal_block_rounds *rounds, pal_team *team, void (
 
 /* ---- parts of a divided order ---- */
 
+pal_err pal_node_order_make_single(pal_node_order *node_order, double unit_m, pal_arena *arena)
+{
+    node_order->unit_m = unit_m;
+    node_order->single_x = PAL_NEW(arena, float, 3 * (size_t)node_order->n_slot);
+    node_order->single_f = PAL_NEW(arena, float, 3 * (size_t)node_order->n_slot);
+    return node_order->single_x && node_order->single_f ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
 pal_err pal_node_order_divide(pal_node_order *node_order, int n_part, pal_arena *arena)
 {
     if (n_part > node_order->n_node) n_part = node_order->n_node;
@@ -333,6 +364,7 @@ pal_err pal_node_order_divide(pal_node_order *node_order, int n_part, pal_arena 
         node_order->part[p] = *node_order;
         if (!PAL_NEW_DOUBLES(arena, 3 * (size_t)node_order->n_slot, &node_order->part[p].x, &node_order->part[p].f))
             return PAL_ERR_MEMORY;
+        if (node_order->single_x) PAL_TRY(pal_node_order_make_single(&node_order->part[p], node_order->unit_m, arena));
     }
     node_order->n_part = n_part;
     return PAL_ERR_OK;
@@ -426,6 +458,10 @@ pal_err pal_part_blocks_make(const pal_simd_blocks *blocks, pal_node_order *node
 
 PAL_INLINE void load_node(const pal_node_order *part, int i, const double *x)
 {
+    if (part->single) {
+        load_single(part, i, x);
+        return;
+    }
     double *to = part->x + part->slot[i];
     for (int d = 0; d < 3; d++) to[d * part->n_slot] = x[3 * i + d];
 }
@@ -445,7 +481,9 @@ static void add_own(const pal_node_order *node_order, int part, double *force)
 {
     const pal_node_order own = node_order->part[part];
     const int end = pal_part_first(own.n_node, node_order->n_part, part + 1);
-    for (int i = pal_part_first(own.n_node, node_order->n_part, part); i < end; i++)
+    const int first = pal_part_first(own.n_node, node_order->n_part, part);
+    for (int i = first; i < end && own.single; i++) take_single(&own, i, force);
+    for (int i = first; i < end && !own.single; i++)
         for (int d = 0; d < 3; d++) {
             double *from = own.f + own.slot[i] + d * own.n_slot;
             force[3 * i + d] += *from;
@@ -458,13 +496,26 @@ void pal_part_add(const pal_part_blocks *blocks, const pal_node_order *node_orde
     const pal_node_order own = node_order->part[part];
     if (!node_order->shares) add_own(node_order, part, force);
     for (int k = blocks->other_first[part]; k < blocks->other_first[part + 1]; k++)
-        for (int d = 0; d < 3; d++) own.f[own.slot[blocks->other[k]] + d * own.n_slot] = 0;
+        for (int d = 0; d < 3; d++) {
+            const int at = own.slot[blocks->other[k]] + d * own.n_slot;
+            if (own.single)
+                own.single_f[at] = 0;
+            else
+                own.f[at] = 0;
+        }
 }
 
-void pal_node_order_begin(pal_node_order *node_order)
+void pal_node_order_begin(pal_node_order *node_order, bool single, const double *x)
 {
     node_order->shares = true;
     node_order->loaded = false;
+    node_order->single = single && node_order->single_x;
+    memcpy(node_order->origin_m, x + 3 * (size_t)(node_order->n_node / 2), sizeof node_order->origin_m);
+    for (int p = 0; p < node_order->n_part; p++) { /* what parts are made of in units of the whole */
+        pal_node_order *part = &node_order->part[p];
+        part->single = node_order->single, part->unit_N = node_order->unit_N;
+        memcpy(part->origin_m, node_order->origin_m, sizeof part->origin_m);
+    }
 }
 
 static void end_part(void *user, int worker, int part)
@@ -480,5 +531,5 @@ void pal_node_order_end(pal_node_order *node_order, double *force)
     const bool in_parts = node_order->n_part > 0 && !node_order->undivided;
     if (node_order->loaded && in_parts) pal_team_run(node_order->team, node_order->n_part, end_part, &pass);
     if (node_order->loaded && !in_parts) run_nodes(&pass);
-    node_order->shares = node_order->loaded = false;
+    node_order->shares = node_order->loaded = node_order->single = false;
 }

@@ -25,6 +25,11 @@ typedef struct pal_node_order {
     pal_team *team;              /* threads that share passes over nodes and blocks; NULL: the caller's alone */
     int n_part;                  /* of an order that is divided between threads (pal_node_order_divide), else 0 */
     struct pal_node_order *part; /* the same slots with x and f of their own                        [n_part] */
+    /* Positions and forces as x and f in single precision, NULL: not made. Positions are relative to a node in the
+     * middle of the list, in units of unit_m; forces in units of unit_N, the largest of the body's springs */
+    float *single_x, *single_f;
+    double unit_m, unit_N, origin_m[3];
+    bool single; /* these are in use, and not x and f; between begin and end */
     /* between pal_node_order_begin and _end; x, or the x of all parts, is loaded; a component of the body is not
      * divided */
     bool shares, loaded, undivided;
@@ -77,6 +82,8 @@ pal_err pal_block_rounds_make(const pal_simd_blocks *blocks, const pal_node_orde
 /* calls piece(user, part) for every part, round by round; team may be NULL */
 void pal_block_rounds_run(const pal_block_rounds *rounds, pal_team *team, void (*piece)(void *user, int part),
                           void *user);
+/* makes single_x and single_f of an order that is not yet divided; unit_N is the caller's. MEMORY */
+pal_err pal_node_order_make_single(pal_node_order *node_order, double unit_m, pal_arena *arena);
 /* Divides the nodes into at most n_part parts of successive ones, about as many in each; passes over nodes then have as
  * many pieces, so that the memory of a node stays with one thread. MEMORY */
 pal_err pal_node_order_divide(pal_node_order *node_order, int n_part, pal_arena *arena);
@@ -100,7 +107,8 @@ void pal_part_load(const pal_part_blocks *blocks, const pal_node_order *node_ord
 void pal_part_add(const pal_part_blocks *blocks, const pal_node_order *node_order, int part, double *force);
 /* Components of one evaluation of forces share an order: positions are loaded once, and the sums of all are added once,
  * to force [n_node][3]. All of a body run in parts, or none. Elsewhere each loads and adds */
-void pal_node_order_begin(pal_node_order *node_order);
+/* single: in single precision, where the order has that; x [n_node][3]: the positions that will be loaded */
+void pal_node_order_begin(pal_node_order *node_order, bool single, const double *x);
 void pal_node_order_end(pal_node_order *node_order, double *force);
 /* node_order->x = positions x [n_node][3] */
 void pal_node_order_load(pal_node_order *node_order, const double *x);

@@ -66,14 +66,15 @@ PAL_INLINE void kernel(const double *p[][3], pal_wide w, pal_wide kq, pal_wide f
     f[0][0] = s * dx, f[0][1] = s * dy, f[0][2] = s * dz;
 }
 
-/* adds what the kernel omits: edges without length push their ends apart along the rest direction */
-static void reopen(const pal_spring_set *set, const pal_body *body)
+/* adds what the kernel omits: edges without length, below the root of `min2` of that at rest, push their ends apart
+ * along the rest direction */
+static void reopen(const pal_spring_set *set, const pal_body *body, double min2)
 {
     for (int i = 0; i < set->n_item; i++) {
         int a = 3 * set->item[2 * i], b = 3 * set->item[2 * i + 1], lane = set->simd_blocks.place[i];
         double d[3], w = set->w[lane];
         pal_sub3(d, body->d + b, body->d + a);
-        if (pal_dot3(d, d) * w * w >= PAL_ROUNDING * PAL_ROUNDING) continue;
+        if (pal_dot3(d, d) * w * w >= min2) continue;
         pal_sub3(d, body->x_rest + b, body->x_rest + a);
         double s = set->spring.k_J * set->q[lane] * w * w;
         pal_axpy3(body->f + b, s, d);
@@ -88,7 +89,8 @@ static pal_err run(void *self, pal_step *step)
     const edge_distance *e = self;
     pal_body *body = step->body;
     spring_select(self, body);
-    if (spring_forces(&e->set, body) < PAL_ROUNDING * PAL_ROUNDING) reopen(&e->set, body);
+    const double min2 = step->single ? PAL_SPRING_SINGLE_SHORT * PAL_SPRING_SINGLE_SHORT : PAL_ROUNDING * PAL_ROUNDING;
+    if (spring_forces(&e->set, body) < min2) reopen(&e->set, body, min2);
     if (e->set.spring.c_Js > 0) pal_spring_damp(&e->set, body, PAL_SPRING_DISTANCE);
     return PAL_ERR_OK;
 }

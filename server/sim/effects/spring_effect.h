@@ -5,6 +5,7 @@
 #define PAL_SIM_EFFECTS_SPRING_EFFECT_H
 #include "server/sim/core/effect_list.h"
 #include "server/sim/springs/spring_lattice.h"
+#include "server/sim/springs/spring_single.h"
 
 static inline void spring_select(const void *self, const pal_body *body)
 {
@@ -34,7 +35,9 @@ typedef struct spring_pass {
         const int first = parts.first[part], n = parts.first[part + 1] - first;                                        \
         (void)worker;                                                                                                  \
         pal_part_load(&parts, order, part, pass->body->d);                                                             \
-        pass->min[part] = pal_spring_run(pass->set, &order->part[part], parts.block + first, n, kernel, N_CORNER);     \
+        const int32_t *block = parts.block + first;                                                                    \
+        pass->min[part] = order->single ? pal_spring_single_run(pass->set, &order->part[part], block, n)               \
+                                        : pal_spring_run(pass->set, &order->part[part], block, n, kernel, N_CORNER);   \
         pal_part_add(&parts, order, part, pass->body->f);                                                              \
     }                                                                                                                  \
     static double spring_forces(const pal_spring_set *set, pal_body *body)                                             \
@@ -47,7 +50,9 @@ typedef struct spring_pass {
             for (int p = 0; p < order->n_part; p++) min = pass.min[p] < min ? pass.min[p] : min;                       \
         } else {                                                                                                       \
             if (!order->loaded) pal_node_order_load(order, body->d);                                                   \
-            min = pal_spring_run(set, order, NULL, set->simd_blocks.n_lane / PAL_LANES, kernel, N_CORNER);             \
+            const int n = set->simd_blocks.n_lane / PAL_LANES;                                                         \
+            min = order->single ? pal_spring_single_run(set, order, NULL, n)                                           \
+                                : pal_spring_run(set, order, NULL, n, kernel, N_CORNER);                               \
             if (!order->shares) pal_node_order_add(order, body->f);                                                    \
         }                                                                                                              \
         order->loaded = order->shares;                                                                                 \

@@ -159,6 +159,7 @@ static pal_err build(pal_config_entry *item, pal_build *build, pal_component_lis
     body->edge_m = mesh->tets.edge_m;
     if (recover) PAL_TRY(pal_spring_lattice_make(body, build->arena));
     PAL_TRY(pal_node_order_make(body->x_rest, body->n_node, body->edge_m, build->arena, &body->node_order));
+    PAL_TRY(pal_node_order_make_single(body->node_order, body->edge_m, build->arena));
     const int max = body->n_node / PAL_PART_NODES, threads = build->scene->threads;
     const int n_part = threads < max ? threads : max;
     return n_part > 1 ? pal_node_order_divide(body->node_order, n_part, build->arena) : PAL_ERR_OK;

@@ -16,6 +16,11 @@
  * what tissue leaves. The lumped mass is heavier than the tissue held: a light free body that is grasped starts more
  * slowly.
  *
+ * Forces of springs are in single precision (springs/spring_single.h) while a body with supports moves. Roundings of
+ * its positions, 1e-6 of an element, are random kicks, which do not let it come to rest: where no node moves by a
+ * hundred times as much in a sub-step, forces are in double precision. So are those of a free body, which would keep
+ * what roundings of sums give it as momentum.
+ *
  * Where the budget of sub-steps is exhausted (step->adds_mass), mass is added to the nodes that break the inequality at
  * PAL_FAST_SAFETY: such bodies are far from the shape that the bound is of.
  * Changes of added mass would add energy, so such a node loses up to a hundredth of its velocity per sub-step.
@@ -44,6 +49,7 @@ typedef struct verlet {
     part_result *result;  /* of the last sub-step                              [n_part] */
     int n_since;          /* sub-steps since then                                */
     bool known;           /* stable_s holds                                      */
+    bool is_held;         /* a node is fixed or prescribed: momentum comes and goes, forces may be single */
     bool has_inversion;   /* bounds must be computed again in the coming step */
 } verlet;
 
@@ -74,6 +80,14 @@ static double usable_s(const verlet *solver, double move_m)
     return (is_fast(solver, move_m) ? fmin(solver->safety, PAL_FAST_SAFETY) : solver->safety) * solver->stable_s;
 }
 
+/* largest speed of a node: what the last sub-step left, wherever the state has come from since */
+static double max_speed_m_s(const pal_body *body)
+{
+    double max2 = 0;
+    for (int i = 0; i < body->n_dof; i++) max2 = fmax(max2, pal_dot3(body->v + 3 * i, body->v + 3 * i));
+    return sqrt(max2);
+}
+
 /* safety times the smallest over free nodes of 2 t, t the positive root of t^2 K + t C = m */
 static double limit(void *self, pal_step *step)
 {
@@ -84,6 +98,7 @@ static double limit(void *self, pal_step *step)
     const double move_m = PAL_GUARD_MOVE * body->edge_m;
     const bool holds = solver->moved_m <= move_m || (is_fast(solver, move_m) && solver->n_since < PAL_FAST_SUBSTEPS);
     if (solver->known && !contact && !has_inversion && holds) return usable_s(solver, move_m);
+    if (!solver->known) solver->speed_m_s = max_speed_m_s(body);
     solver->has_inversion = pal_guard_recover(step) & PAL_INVERTED;
     size_t n_byte = sizeof(double) * (size_t)body->n_dof;
     memset(solver->stiff, 0, n_byte);
@@ -91,9 +106,11 @@ static double limit(void *self, pal_step *step)
     pal_guard_add_bounds(step->force, step->n_force, body, solver->stiff, solver->damp);
     pal_guard_add_bounds(step->contact, step->n_contact, body, solver->stiff, solver->damp);
     double min = INFINITY, sum = 0;
+    solver->is_held = false;
     for (int i = 0; i < body->n_dof; i++) {
         double k = solver->stiff[i], c = solver->damp[i], m = body->mass_kg[i];
         sum += 0 * k + 0 * c;
+        solver->is_held |= body->support[i] != 0;
         if (body->support[i] || k + c == 0) continue;
         double dt = 4 * m / (c + sqrt(c * c + 4 * k * m));
         if (dt < min) min = dt;
@@ -161,6 +178,12 @@ static void move_part(void *user, int worker, int part)
     p->solver->result[part] = made;
 }
 
+/* moves far enough in a sub-step that roundings of positions are nothing beside, and is held */
+static bool takes_single(const verlet *solver, const pal_body *body, double dt_s)
+{
+    return solver->is_held && solver->speed_m_s * dt_s > PAL_SINGLE_MOVE * body->edge_m;
+}
+
 static pal_err run(void *self, pal_step *step)
 {
     verlet *solver = self;
@@ -173,7 +196,7 @@ static pal_err run(void *self, pal_step *step)
               .max_m = pal_guard_max_move_m(body),
               .adds_mass = step->adds_mass,
               .n_part = pal_node_order_parts(body->node_order)};
-    step->drag_separate = true;
+    step->drag_separate = true, step->single = takes_single(solver, body, dt);
     PAL_TRY(pal_assemble_forces(step));
     pal_team_run(body->team, p.n_part, move_part, &p);
     for (int i = 0; i < p.n_part; i++) {
@@ -194,7 +217,6 @@ static void reset(void *self, const pal_body *body)
     (void)body;
     verlet *solver = self;
     solver->known = false;
-    solver->speed_m_s = 0;
 }
 
 const pal_effect pal_effect_verlet = {PAL_EFFECT("verlet", SOLVE), .moves_nodes = true, .bounds.limit = limit,

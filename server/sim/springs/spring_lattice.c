@@ -65,7 +65,7 @@ static void act_set(pal_spring_set *set, int n_tet, const uint8_t *on)
         const int lane = blocks->place[i];
         set->q[lane] = set->all[lane] * (set->q[lane] / set->around[lane]);
     }
-    set->changed = true;
+    pal_spring_set_changed(set);
 }
 
 static void act(void *self, const uint8_t *on)

@@ -8,6 +8,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+void pal_spring_set_changed(pal_spring_set *set)
+{
+    for (int i = 0; i < set->simd_blocks.n_lane; i++) set->single_q[i] = (float)set->q[i];
+    set->changed = true;
+}
+
 /* ---- regions ---- */
 
 /* weights of the body's material as it is */
@@ -22,7 +28,7 @@ static void weigh(pal_spring_set *set, const pal_material *material)
         for (int k = 0; k < 4; k++) q[i] += over[k] * set->part[k][i];
     }
     if (set->all) memcpy(set->q, q, sizeof *q * (size_t)set->simd_blocks.n_lane);
-    set->changed = true;
+    pal_spring_set_changed(set);
 }
 
 /* what each tetrahedron counts, by what its region gives: nothing, E, Poisson's ratio, both [4][n_tet]; false: all are
@@ -74,6 +80,27 @@ static pal_err take_regions(pal_spring_set *set, const pal_build *build, double 
 
 /* ---- making ---- */
 
+/* what the sub-steps read (spring_single.h) */
+static pal_err fill_single(pal_spring_set *set, pal_node_order *order, pal_arena *arena)
+{
+    const int n_lane = set->simd_blocks.n_lane, power[3] = {2, 2, 3};
+    const double scale = pow(order->unit_m, power[set->spring.kind]);
+    double max = 0;
+    set->single_w = PAL_NEW(arena, float, n_lane);
+    set->single_q = PAL_NEW(arena, float, n_lane);
+    if (!set->single_w || !set->single_q) return PAL_ERR_MEMORY;
+    for (int i = 0; i < n_lane; i++) {
+        const double w = set->w[i];
+        set->single_w[i] = (float)(scale * (set->spring.kind == PAL_SPRING_DISTANCE ? w * w : w));
+        max = fmax(max, set->q[i]);
+    }
+    /* a power of two, so that roundings, and with them states, do not depend on it */
+    const double size_N = set->spring.k_J * max / order->unit_m;
+    if (size_N > 0) order->unit_N = fmax(order->unit_N, exp2(floor(log2(size_N))));
+    pal_spring_set_changed(set);
+    return PAL_ERR_OK;
+}
+
 static pal_err fill(pal_spring_set *set, const pal_build *build, double *weight)
 {
     const pal_body *body = build->body;
@@ -91,6 +118,7 @@ static pal_err fill(pal_spring_set *set, const pal_build *build, double *weight)
         set->w[set->simd_blocks.place[i]] = 1 / pal_spring_measure(set->spring.kind, x);
         set->q[set->simd_blocks.place[i]] = weight[i];
     }
+    PAL_TRY(fill_single(set, body->node_order, arena));
     return take_regions(set, build, weight);
 }
 

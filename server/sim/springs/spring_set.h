@@ -22,6 +22,7 @@ typedef struct pal_spring_set {
     pal_simd_blocks simd_blocks;
     pal_part_blocks part_blocks; /* for several threads */
     double *w, *q;               /* by lane; 0: no spring                          [n_lane]           */
+    float *single_w, *single_q;  /* the same for positions in units of an edge, w of edges squared [n_lane] */
     /* with regions of other materials, q = part[0] + part[1]/E + part[2]/factor + part[3]/(E factor) of the body's E
      * and factor; whole is q without regions; NULL: no regions [n_lane] */
     double *part[4], *whole;
@@ -48,6 +49,9 @@ void pal_spring_volume_range(const pal_spring_set *set, pal_node_order *node_ord
 double pal_spring_young_Pa(const pal_spring_set *set, const pal_body *body, double poisson);
 /* a live edit: k_J, and with regions q too */
 pal_err pal_spring_set_material(void *self, const pal_body *body, const pal_material *material, pal_diagnostic *diag);
+
+/* q has changed */
+void pal_spring_set_changed(pal_spring_set *set);
 
 PAL_INLINE void pal_spring_corners(const pal_spring_set *set, const double *x, int i, const double *to[PAL_CORNERS])
 {

@@ -458,7 +458,9 @@ static void answers_a_symmetric_load_symmetrically(void)
                 apart = fmax(apart, fabs(l[0] + r[0] - 0.04) + fabs(l[1] - r[1]) + fabs(l[2] - r[2]));
             }
     CHECK(max > 1e-4);
-    CHECK_LE(apart, 1e-9 * max);
+    /* to roundings of positions in single precision, which differ at both ends: 2.4e-7 of an edge four voxels away, a
+     * strain error that soft motions answer by several times as much (6e-6 of an edge here) */
+    CHECK_LE(apart, 2e-5 * 0.01);
     pal_world_destroy(world);
     free(scene);
     box_free(&box);
