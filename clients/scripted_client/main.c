@@ -107,7 +107,8 @@ static void main_reported(void *user, const pal_order_result *reported)
     cJSON *o = PAL_JSON({"order", JSON_TEXT(r->line->order.verb)}, {"line", JSON_NUMBER(r->line->number)},
                         {"done", JSON_BOOL(r->answer != NULL)}, {"text", JSON_TEXT(r->text)},
                         {"answer_ms", JSON_NUMBER(r->answer_ms)}, {"frame_ms", JSON_NUMBER(r->frame_ms)},
-                        {"gap_ms", JSON_NUMBER(r->gap_ms)}, {"moved_mm", JSON_NUMBER(r->moved_m * 1e3)},
+                        {"gap_ms", JSON_NUMBER(r->gap_ms)}, {"given_s", JSON_NUMBER(r->given_s)},
+                        {"answered_s", JSON_NUMBER(r->answered_s)}, {"moved_mm", JSON_NUMBER(r->moved_m * 1e3)},
                         {"epoch", JSON_NUMBER(r->epoch)}, {"vertices", JSON_NUMBER(r->n_vertex)});
     for (uint32_t i = 0; r->answer && i < r->answer->n_arg; i++)
         cJSON_AddNumberToObject(o, r->answer->arg[i].key, r->answer->arg[i].value);

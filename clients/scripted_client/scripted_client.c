@@ -44,7 +44,7 @@ struct pal_scripted_client {
     int order;
     bool asked, answered, reshaped, refused; /* reshaped: another topology came since it was given */
     uint64_t asked_ns, answered_ns;
-    double gap_ms;
+    double gap_ms, given_s, answered_s, moved_m; /* as in pal_order_result */
     pal_wire_answer answer;
     char text[PAL_WIRE_TEXT_BYTES];
     pal_scripted_client_result result;
@@ -137,6 +137,12 @@ static double client_moved(const pal_scripted_client *t, const char *target)
     return moved;
 }
 
+/* time of the session since the first cycle */
+static double client_session_s(const pal_scripted_client *t)
+{
+    return (double)(t->sim_us - t->first_sim_us) * 1e-6;
+}
+
 /* what came of the order under way, once it is answered and what it changed is seen */
 static void client_report(pal_scripted_client *t)
 {
@@ -149,7 +155,9 @@ static void client_report(pal_scripted_client *t)
                                        .answer_ms = (double)(t->answered_ns - t->asked_ns) * 1e-6,
                                        .frame_ms = t->reshaped ? (double)(now - t->asked_ns) * 1e-6 : 0,
                                        .gap_ms = t->gap_ms,
-                                       .moved_m = client_moved(t, line->order.target),
+                                       .given_s = t->given_s,
+                                       .answered_s = t->answered_s,
+                                       .moved_m = t->moved_m,
                                        .epoch = t->part[0].epoch,
                                        .n_vertex = t->part[0].n_vertex};
     t->asked = false;
@@ -167,6 +175,7 @@ static void client_answered(pal_scripted_client *t, const pal_control *c)
     snprintf(t->text, sizeof t->text, "%s", t->refused ? c->error.text : c->answer.text);
     t->answered = true;
     t->answered_ns = pal_clock_ns();
+    t->answered_s = client_session_s(t);
     client_report(t);
 }
 
@@ -176,7 +185,7 @@ static void client_order(pal_scripted_client *t, uint64_t now)
     const pal_orders *orders = t->options.orders;
     const client_part *part = &t->part[0];
     if (!orders || t->order >= orders->n_line || t->asked || !t->cycle_seen || !part->seen) return;
-    if ((double)(t->sim_us - t->first_sim_us) * 1e-6 < orders->line[t->order].t_s) return;
+    if (client_session_s(t) < orders->line[t->order].t_s) return;
     pal_control c = {.type = PAL_CONTROL_COMMAND};
     if (!pal_order_fill(&orders->line[t->order], part->now_m, part->n_vertex, &c.command)) return;
     if (pal_link_send_control(t->link, &c)) return;
@@ -184,6 +193,8 @@ static void client_order(pal_scripted_client *t, uint64_t now)
     t->answered = t->reshaped = t->refused = false;
     t->asked_ns = now;
     t->gap_ms = 0;
+    t->given_s = client_session_s(t);
+    t->moved_m = client_moved(t, c.command.target);
 }
 
 static void client_decode(pal_scripted_client *t, uint32_t index, const uint8_t *bytes, size_t n_byte)
