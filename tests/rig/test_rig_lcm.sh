@@ -40,13 +40,15 @@ check "200: lost models are counted" "$(json models_lost "$work/bridge_200")" '>
 through outage models=420,stale=1,force_N=0.06
 check "outage: and those that it took" "$(json models_lost "$work/bridge_outage")" '>=' 1
 check "outage: the models of the bridge get stale" "$(json stale "$work/bridge_outage")" '>=' 1
-# models are stale after 0.5 s at most, the force has faded 0.5 s later, and a damping of 0.5 N s/m is left (README.md of
-# the bridge); a line may be half written; an age of more than an hour is that of no model
-free='NF == 4 && $1 > 1.01 && $1 < 3600'
-check "outage: states without a fresh model are heard" "$(awk "$free" "$work/force_outage" | wc -l)" '>' 50
-check "outage: then nothing but damping is felt (N)" "$(awk "$free"' { over = $2 - 0.5 * $3; if (over > max) max = over }
+# a model is stale 0.5 s after its arrival at most, the force has faded 0.5 s later, and damping is left (README.md of the
+# bridge): 0.5 N s/m, or more where the energy gate asks for it; a line may be half written; an age of more than an hour is
+# that of no model. On a busy machine a model may be old when it arrives: what counts is how much older it is than in the
+# first state that had it
+free='NF == 4 && $4 != model { model = $4; arrived = $1 } { free = NF == 4 && $1 - arrived > 1.01 && $1 < 3600 }'
+check "outage: states without a fresh model are heard" "$(awk "$free free" "$work/force_outage" | wc -l)" '>' 50
+check "outage: then nothing but damping is felt (N)" "$(awk "$free"' free && $3 > max { max = $3 }
     END { print max + 0 }' "$work/force_outage")" '<' 0.001
-check "outage: force is felt again" "$(awk 'NF == 4 { if ($1 > 1.01 && $1 < 3600) gap = 1; else if (gap && $2 > max) max = $2 }
+check "outage: force is felt again" "$(awk "$free"' free { gap = 1 } NF == 4 && !free && gap && $2 > max { max = $2 }
     END { print max + 0 }' "$work/force_outage")" '>' 0.05
 
 # two devices at one bridge, each with a tool and channels of its own

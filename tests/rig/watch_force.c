@@ -1,12 +1,13 @@
 /* Hears the tool states that a bridge publishes on LCM and prints a line for each: age of the newest model in s, norm
- * of the force on the hand in N, speed in m/s, number of that model. Ends on a signal. usage: watch_force BUS CHANNEL
- */
+ * of the force on the hand in N, how much of it no damping explains in N (norm less the part against the motion),
+ * number of that model. Ends on a signal. usage: watch_force BUS CHANNEL */
 #include "clients/link/lcm_link.h"
 #include "clients/link/lcm_seal.h"
 #include "palpate_tool_state_t.h"
 #include "server/base/vec3.h"
 
 #include <lcm/lcm.h>
+#include <math.h>
 #include <stdio.h>
 
 static void watch_state(const lcm_recv_buf_t *buffer, const char *channel, void *user)
@@ -18,7 +19,9 @@ static void watch_state(const lcm_recv_buf_t *buffer, const char *channel, void 
         return;
     if (palpate_tool_state_t_decode(buffer->data, 0, (int)buffer->data_size, &s) < 0) return;
     const double force[3] = {s.force[0], s.force[1], s.force[2]}, speed[3] = {s.vel[0], s.vel[1], s.vel[2]};
-    printf("%.6f %.6f %.6f %d\n", (double)(uint32_t)s.model_age_us * 1e-6, pal_norm3(force), pal_norm3(speed),
+    const double norm = pal_norm3(force),
+                 against = pal_norm3(speed) > 0 ? -pal_dot3(force, speed) / pal_norm3(speed) : 0;
+    printf("%.6f %.6f %.6f %d\n", (double)(uint32_t)s.model_age_us * 1e-6, norm, norm - fmax(against, 0),
            (int)s.model_seq);
     palpate_tool_state_t_decode_cleanup(&s);
 }
