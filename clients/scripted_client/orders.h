@@ -45,7 +45,7 @@ typedef struct pal_order_result {
     double answer_ms;              /* from sending to the answer */
     double frame_ms;               /* to the first frame of another topology; 0: none */
     double gap_ms;                 /* longest interval between two cycles until then */
-    double given_s, answered_s; /* session time of the newest cycle then, from the first cycle */
+    double given_s, answered_s;    /* session time of the newest cycle then, from the first cycle */
     double moved_m; /* when it was given: largest displacement of a vertex of its body since the first frame of the
                      * topology */
     uint32_t epoch, n_vertex; /* of the first part now */
