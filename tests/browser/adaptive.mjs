@@ -8,6 +8,7 @@ import {
     checkConsoles,
     displacement,
     drag,
+    grasp,
     launch,
     nextFrame,
     open,
@@ -224,8 +225,7 @@ await run(async () => {
     await ada.screenshot({ path: join(pictures, "adaptive_after.png") });
 
     await ada.click("#mode-pull");
-    await ada.mouse.move(pixel.x, pixel.y);
-    await ada.mouse.down();
+    await grasp(ada, pixel);
     await drag(ada, pixel, -8, -2, 10);
     const pulled = await until(
         async () => ({ ...(await shown(ada)), far: await displacement(ada) }),

@@ -8,6 +8,7 @@ import {
     checkConsoles,
     displacement,
     drag,
+    grasp,
     launch,
     open,
     organPixel,
@@ -55,8 +56,7 @@ await run(async () => {
     const rest = await displacement(page);
     const pixel = await until(() => organPixel(page));
     check("the body is at rest", rest < 1e-4, `${1000 * rest} mm`);
-    await page.mouse.move(pixel.x, pixel.y);
-    await page.mouse.down();
+    await grasp(page, pixel);
     await drag(page, pixel, 8, -4, 12);
     const max = await until(
         () => displacement(page),

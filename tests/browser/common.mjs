@@ -214,6 +214,16 @@ export async function settled(page, tolerance, seconds) {
     return now?.m ?? NaN;
 }
 
+/**
+ * presses the mouse at a pixel until the tool grasps there: dragged at once, a busy machine's tool grasps what is elsewhere by
+ * then
+ */
+export async function grasp(page, pixel) {
+    await page.mouse.move(pixel.x, pixel.y);
+    await page.mouse.down();
+    await until(() => page.evaluate(() => window.palpate.state.ownToolState()?.grasps));
+}
+
 /** moves the pressed mouse from a pixel in steps, a picture each */
 export async function drag(page, pixel, dx, dy, steps) {
     for (let i = 1; i <= steps; i++) {

@@ -6,6 +6,7 @@ import {
     checkConsoles,
     displacement,
     drag,
+    grasp,
     launch,
     open,
     organPixel,
@@ -34,8 +35,7 @@ await run(async () => {
     const pixel = await organPixel(eve);
     await until(time, (s) => s > 4);
     const rest = await displacement(eve);
-    await eve.mouse.move(pixel.x, pixel.y);
-    await eve.mouse.down();
+    await grasp(eve, pixel);
     await drag(eve, pixel, 6, -6, 12);
     await until(
         () => displacement(eve),
@@ -133,8 +133,7 @@ await run(async () => {
     );
     check("the next one goes on live", goes === "live" || /of real time/.test(goes), goes);
     const hold = await organPixel(ada);
-    await ada.mouse.move(hold.x, hold.y);
-    await ada.mouse.down();
+    await grasp(ada, hold);
     await drag(ada, hold, -6, -6, 10);
     const own = await until(
         () => ada.evaluate(() => window.palpate.state.ownToolState()?.grasps),

@@ -6,6 +6,7 @@ import {
     check,
     checkConsoles,
     drag,
+    grasp,
     launch,
     open,
     organPixel,
@@ -54,8 +55,7 @@ const choose = (page, name) =>
         list.dispatchEvent(new Event("change"));
     }, name);
 const pull = async (page, pixel, steps) => {
-    await page.mouse.move(pixel.x, pixel.y);
-    await page.mouse.down();
+    await grasp(page, pixel);
     await drag(page, pixel, 7, -8, steps);
 };
 

@@ -6,6 +6,7 @@ import {
     check,
     checkConsoles,
     drag,
+    grasp,
     launch,
     nextFrame,
     open,
@@ -62,8 +63,7 @@ await run(async () => {
     check("the key 5 opens the plots", await ada.isVisible("#plots canvas"));
 
     const pixel = await organPixel(ada);
-    await ada.mouse.move(pixel.x, pixel.y);
-    await ada.mouse.down();
+    await grasp(ada, pixel);
     await drag(ada, pixel, 7, -8, 12);
     const force = await until(
         () => newest(ada, "force_N"),
@@ -73,7 +73,6 @@ await run(async () => {
     const pair = await until(
         async () => ({ plot: await newest(ada, "force_N"), label: await forceLabel(ada) }),
         ({ plot, label }) => plot > 0.05 && Math.abs(plot - label) <= 0.0051,
-        60000,
     );
     check(
         "the plotted force is that of the label",
@@ -91,7 +90,6 @@ await run(async () => {
                 };
             }),
         ({ mm, largest }) => mm > 1 && mm < 1.05 * largest,
-        60000,
     );
     check(
         "the displacement is one of the surface",
@@ -103,7 +101,6 @@ await run(async () => {
     const mJ = await until(
         () => newest(ada, "work_mJ"),
         (w) => w > 0.1,
-        60000,
     );
     const reach = await until(
         () =>
@@ -119,7 +116,6 @@ await run(async () => {
                 return { mm, above: 1e3 * state.hello.tools[state.ownTool].radius_m - depth.at(-1) };
             }),
         ({ mm, above }) => Math.abs(above) < 1.01 * mm && Math.abs(above) > 0.85 * mm,
-        60000,
     );
     check(
         "the depth is that of the tool along the normal of the nearest place at rest",
@@ -135,7 +131,6 @@ await run(async () => {
                 return { total, kinetic, components: window.palpate.state.running };
             }),
         ({ total }) => total > 0.1,
-        60000,
     );
     check(
         "the pulled body has elastic energy, more than kinetic energy",
@@ -224,7 +219,8 @@ await run(async () => {
     await ada.click("#capture-video");
     await ada.waitForSelector("#capture-stop");
     await drag(ada, { x: 1000, y: 150 }, 4, 1, 5);
-    await ada.waitForFunction(() => document.getElementById("capture-stop").textContent.includes("0:01"));
+    // a second at least: on a busy machine nobody sees 0:01
+    await ada.waitForFunction(() => !document.getElementById("capture-stop").textContent.includes("0:00"));
     await ada.screenshot({ path: join(pictures, "capture.png") });
     const video = await saved(ada, "#capture-stop");
     writeFileSync(join(pictures, video.name), video.bytes);

@@ -7,6 +7,7 @@ import {
     consoleErrors,
     displacement,
     drag,
+    grasp,
     launch,
     nextFrame,
     open,
@@ -147,8 +148,7 @@ await run(async () => {
         Math.abs(scale.px / scale.pixels / (parseFloat(scale.text) / 1000) - 1) < 0.02,
         `${scale.text} are ${scale.px} pixels, a metre ${scale.pixels.toFixed(0)}`,
     );
-    await ada.mouse.move(pixel.x, pixel.y);
-    await ada.mouse.down();
+    await grasp(ada, pixel);
     await drag(ada, pixel, 7, -8, 12);
     const pulled = await until(
         () => displacement(ben),

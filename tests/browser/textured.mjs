@@ -10,6 +10,7 @@ import {
     colourAt,
     displacement,
     drag,
+    grasp,
     launch,
     open,
     organPixel,
@@ -161,8 +162,7 @@ async function testModel(model, obj) {
     check("a closed surface stays closed", before.closed && before.copies > 10, `${before.copies} copies`);
 
     const pixel = await organPixel(page);
-    await page.mouse.move(pixel.x, pixel.y);
-    await page.mouse.down();
+    await grasp(page, pixel);
     await drag(page, pixel, 12, 2, 12);
     const moved = await until(
         () => displacement(page),

@@ -7,6 +7,7 @@ import {
     displacement,
     drag,
     drawn,
+    grasp,
     launch,
     nextFrame,
     open,
@@ -69,9 +70,7 @@ const pickingError = (page, pixel) =>
 /** pulls at a pixel until the organ follows, and lets go @returns how far it was pulled, m */
 async function pull(page, pixel, name) {
     const before = await displacement(page);
-    await page.mouse.move(pixel.x, pixel.y);
-    await page.mouse.down();
-    await until(() => value(page, "state.ownToolState()?.grasps")); // a slow server grasps late
+    await grasp(page, pixel);
     await drag(page, pixel, 5, -6, 10);
     const pulled = await until(
         () => displacement(page),
