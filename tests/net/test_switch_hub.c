@@ -76,7 +76,7 @@ static void tools_stay_with_who_holds_them(void)
     mem_client c;
     uint32_t seq = 0;
     begin();
-    join(&c, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, 0); /* whose orders do not depend on the speed of the machine */
     for (int round = 0; round < 3; round++) {
         const double at[3] = {0, 0, 0.12 + 0.01 * round};
         mem_pose(&c, 0, ++seq, at);
@@ -112,7 +112,7 @@ static void a_pressure_is_transferred(void)
     uint32_t seq = 0;
     const double away[3] = {0, 0, 0.2};
     begin();
-    join(&c, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, 0); /* whose orders do not depend on the speed of the machine */
     mem_pose(&c, 0, ++seq, away);
     double rest = highest(&c);
     CHECK(order(&c, "inflate", TOP ",\"radius_m\":0.04,\"pressure_Pa\":2000"));
@@ -138,7 +138,7 @@ static void a_handle_is_transferred(void)
     uint32_t seq = 0;
     const double away[3] = {0, 0, 0.2};
     begin();
-    join(&c, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, 0); /* whose orders do not depend on the speed of the machine */
     mem_pose(&c, 0, ++seq, away);
     double rest = highest(&c);
     CHECK(order(&c, "curve",
