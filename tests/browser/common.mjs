@@ -116,10 +116,16 @@ export async function launch() {
     return browser;
 }
 
+/** an empty page; its limit only ends what hangs: a busy machine takes more than the 30 s of Playwright for a page */
+export async function newPage(browser, options = {}) {
+    const page = await browser.newPage(options);
+    page.setDefaultTimeout(300000);
+    return page;
+}
+
 /** a page that shows the organ */
 export async function open(browser, address, name, viewport) {
-    const page = await browser.newPage({ viewport });
-    page.setDefaultTimeout(300000);
+    const page = await newPage(browser, { viewport });
     page.on("console", (m) => m.type() === "error" && consoleErrors.push(`${name}: ${m.text()}`));
     page.on("pageerror", (e) => consoleErrors.push(`${name}: ${e.message}`));
     const [place, ticket] = address.split("#");

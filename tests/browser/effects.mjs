@@ -1,7 +1,7 @@
 // What each visual feature costs a picture: prints a table. In software drawing the processor time of Chromium's drawing
 // process is measured, which other load on the machine changes little; with a graphics card the time until the picture is
 // finished would be. usage: node effects.mjs BUILD PICTURES [WIDTHxHEIGHT]
-import { check, launch, prepare, run, serve } from "./common.mjs";
+import { check, launch, newPage, prepare, run, serve } from "./common.mjs";
 
 const PICTURES = 6; // a sample; the first two of a variant compile its shaders and do not count
 
@@ -55,8 +55,7 @@ await run(async () => {
     const server = await serve(prepare(), 0);
     const browser = await launch();
     const session = await browser.newBrowserCDPSession();
-    const page = await browser.newPage({ viewport: { width, height } });
-    page.setDefaultTimeout(300000);
+    const page = await newPage(browser, { viewport: { width, height } });
     await page.goto(`http://127.0.0.1:${server.info.port}/?name=Ada&effects=all`);
     await page.waitForFunction(
         () => window.palpate?.state.bodies.size && [...window.palpate.state.bodies.values()][0].shown,

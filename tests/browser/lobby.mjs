@@ -7,6 +7,7 @@ import {
     check,
     checkConsoles,
     launch,
+    newPage,
     nextFrame,
     palpate,
     pictures,
@@ -47,8 +48,7 @@ await run(async () => {
     const place = info.open.split("#")[0];
     const browser = await launch();
     const page = async (role, name, size, path = "") => {
-        const p = await browser.newPage({ viewport: size });
-        p.setDefaultTimeout(120000);
+        const p = await newPage(browser, { viewport: size });
         await p.goto(`${place}${path}?name=${name}${role ? "#" + info.tickets[role] : ""}`);
         return p;
     };

@@ -3,7 +3,7 @@
 import { execFileSync } from "node:child_process";
 import { writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { check, checkConsoles, launch, palpate, pictures, run, scratch, serve } from "./common.mjs";
+import { check, checkConsoles, launch, newPage, palpate, pictures, run, scratch, serve } from "./common.mjs";
 
 /** three blocks without support: two side by side, 5 mm apart, and one that hangs above and shades them */
 function makeScene() {
@@ -29,8 +29,7 @@ function makeScene() {
 }
 
 async function openPage(browser, port, query) {
-    const page = await browser.newPage({ viewport: { width: 480, height: 360 } });
-    page.setDefaultTimeout(300000);
+    const page = await newPage(browser, { viewport: { width: 480, height: 360 } });
     await page.goto(`http://127.0.0.1:${port}/?name=Ada${query}`);
     await page.waitForFunction(() => window.palpate?.state.bodies.size === 3 && window.palpate.state.status);
     // the effects that are on are there, and every body has had its frame

@@ -8,6 +8,7 @@ import {
     drag,
     grasp,
     launch,
+    newPage,
     nextFrame,
     open,
     organPixel,
@@ -228,7 +229,7 @@ await run(async () => {
         ? video.bytes.readUInt32BE(0) === 0x1a45dfa3 // EBML
         : video.bytes.subarray(4, 8).toString() === "ftyp";
     check("a video is saved", isVideo && video.bytes.length > 1000, `${video.name}, ${video.bytes.length} bytes`);
-    const size = await pictureSize(await browser.newPage(), video.bytes);
+    const size = await pictureSize(await newPage(browser), video.bytes);
     check("which this browser plays", size === "1280 x 800", size);
     check("and its button is gone", await ada.isHidden("#capture-stop"));
 
@@ -244,7 +245,7 @@ await run(async () => {
         ),
     );
 
-    const reduced = await browser.newPage({ reducedMotion: "reduce" });
+    const reduced = await newPage(browser, { reducedMotion: "reduce" });
     await reduced.goto(address);
     await reduced.waitForFunction(() => window.palpate);
     check("who wants less motion begins without the cue", !(await reduced.isChecked("#force-cue")));

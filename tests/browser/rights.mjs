@@ -1,6 +1,6 @@
 // A server that nobody enters without a ticket: what the page of a viewer, a trainee and an instructor offers, what the
 // instructor changes, and that the ticket leaves the address bar.
-import { check, checkConsoles, launch, open, pictures, prepare, run, serve, until } from "./common.mjs";
+import { check, checkConsoles, launch, newPage, open, pictures, prepare, run, serve, until } from "./common.mjs";
 
 const text = (page, id) => page.evaluate((name) => document.getElementById(name).textContent.trim(), id);
 const disabled = (page, id) => page.evaluate((name) => document.getElementById(name).disabled, id);
@@ -81,7 +81,7 @@ await run(async () => {
     check("who is removed is told by whom", gone.includes("Ada has removed you"), gone);
     await tim.screenshot({ path: `${pictures}/rights_removed.png` });
 
-    const odd = await browser.newPage({ viewport: size });
+    const odd = await newPage(browser, { viewport: size });
     await odd.goto(`${place}?role=admin&name=Odd`);
     await odd.waitForFunction(() => window.palpate?.state.status);
     const answer = await until(() => text(odd, "notice"));
