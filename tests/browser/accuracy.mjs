@@ -8,8 +8,11 @@ import { pathToFileURL } from "node:url";
 import {
     check,
     checkConsoles,
+    consoleErrors,
     displacement,
+    grasp,
     launch,
+    newPage,
     open,
     organPixel,
     palpate,
@@ -124,7 +127,7 @@ const flip = (page, name) => page.click(`#components tr[title^="${name}"] input`
 
 /** the report of the study: the button of a row copies the command that writes the scene of this row */
 async function pressRow(browser, file) {
-    const page = await browser.newPage({ viewport: { width: 1200, height: 800 } });
+    const page = await newPage(browser, { viewport: { width: 1200, height: 800 } });
     page.on("pageerror", (e) => consoleErrors.push(`study.html: ${e.message}`));
     await page.goto(pathToFileURL(file).href);
     const buttons = page.locator("tbody button");
@@ -217,8 +220,7 @@ await run(async () => {
 
     // a load causes an error
     const pixel = await until(() => organPixel(ada));
-    await ada.mouse.move(pixel.x, pixel.y);
-    await ada.mouse.down();
+    await grasp(ada, pixel);
     await ada.mouse.move(pixel.x + 60, pixel.y - 60, { steps: 8 });
     const loaded = await until(
         () => shown(ada),
