@@ -80,7 +80,7 @@ void pal_contact_implicit_begin(pal_contact_implicit *solve, pal_contact_springs
     bool touches = false;
     int m = 0;
     while (m < n && pal_contact_springs_add(springs, contact[m].point, contact[m].away, contact[m].k_N_m) >= 0) {
-        solve->active[m] = contact[m].depth_m > 0;
+        solve->active[m] = contact[m].depth_m > 0, solve->released[m] = false;
         if (!solve->active[m]) springs->k_N_m[solve->first + m] = 0;
         solve->force_N[m] = solve->active[m] ? contact[m].k_N_m * contact[m].depth_m : 0;
         touches = touches || solve->active[m];
@@ -97,6 +97,12 @@ void pal_contact_implicit_begin(pal_contact_implicit *solve, pal_contact_springs
     add_load(solve, 1, solve->force_N, 0, springs->n_row - solve->first);
 }
 
+/* came through the sphere after its release in this sub-step */
+static bool is_back(const pal_contact_implicit *solve, int i)
+{
+    return solve->active[i] && solve->released[i];
+}
+
 /* k (d - m) of every contact, active or not; true: other contacts should have been active, by FORCE_SHARE of the
  * forces, and are now. After CHOOSE_ROUNDS solves only a contact that pulls as a whole is changed, by removing springs
  * that pull, so that this ends. In the last of several stages a pull may make up for the push of an earlier one, and
@@ -109,16 +115,15 @@ static bool choose(pal_contact_implicit *solve, double *force_N)
     double wrong = 0, push = 0, pull = 0, *change = solve->share;
     for (int i = 0; i < n; i++) {
         force_N[i] = contact[i].k_N_m * (contact[i].depth_m - springs->motion_m[solve->first + i]);
-        if (solve->active[i] == (force_N[i] > 0))
-            push += solve->active[i] ? force_N[i] : 0;
-        else
-            wrong += fabs(force_N[i]);
-        if (solve->active[i]) pull += fmax(0, -force_N[i]);
+        if (solve->active[i]) push += fmax(0, force_N[i]), pull += fmax(0, -force_N[i]);
+        if (!is_back(solve, i) && solve->active[i] != (force_N[i] > 0)) wrong += fabs(force_N[i]);
     }
     const bool ends = solve->round++ >= CHOOSE_ROUNDS;
     if (!(ends ? !solve->staged && pull > push : wrong > FORCE_SHARE * push)) return false;
     for (int i = 0; i < n; i++) {
-        solve->active[i] = force_N[i] > 0 && (!ends || solve->active[i]);
+        const bool was = solve->active[i];
+        solve->active[i] = ends ? was && force_N[i] > 0 : is_back(solve, i) || force_N[i] > 0;
+        solve->released[i] |= was && !solve->active[i];
         double load = solve->active[i] ? contact[i].k_N_m * contact[i].depth_m : 0;
         change[i] = load - solve->force_N[i];
         solve->force_N[i] = load;

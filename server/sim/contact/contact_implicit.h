@@ -3,11 +3,12 @@
  * Each point near the tool has a spring of stiffness k along `away`. In contact it is active: its load begins at k d,
  * tissue that moves by m along `away` reduces it by k m, and the force is k (d - m). Active springs that pull, and
  * points that came through the sphere, are exchanged and the solver solves again where they bear a noticeable part of
- * the forces, at most three times; after that only where contact would pull as a whole. Coulomb friction is two more
- * springs across the mean direction, as stiff as all springs that are active at first, on the load-weighted mean of the
- * points; beyond friction times the normal force they become that constant force. Springs of points that are only near
- * do not count: a moving tool would begin its sub-step with a load of which the solver's tolerance is the friction
- * itself.
+ * the forces, at most three times; after that only where contact would pull as a whole. One that comes through the
+ * sphere after its release stays, as the same two choices would follow each other for ever. Coulomb friction is two
+ * more springs across the mean direction, as stiff as all springs that are active at first, on the load-weighted mean
+ * of the points; beyond friction times the normal force they become that constant force. Springs of points that are
+ * only near do not count: a moving tool would begin its sub-step with a load of which the solver's tolerance is the
+ * friction itself.
  *
  * Where the solve leaves more than the caps (pal_tool_force_share), all springs of the tool become constant forces
  * shortened to the caps and the solver solves once more (pal_tangent.settle). Tissue then moves less than before, so
@@ -43,6 +44,7 @@ typedef struct pal_contact_implicit {
     double force_N[PAL_CONTACT_IMPLICIT_MAX + 2]; /* of the loads in body->load, by row from `first` */
     double share[PAL_CONTACT_IMPLICIT_MAX];       /* scratch */
     uint8_t active[PAL_CONTACT_IMPLICIT_MAX];     /* of the contacts */
+    uint8_t released[PAL_CONTACT_IMPLICIT_MAX];   /* they were, in this sub-step */
 } pal_contact_implicit;
 
 /* keeps at most PAL_CONTACT_IMPLICIT_MAX contacts, stiffer for those left out; returns how many */
