@@ -452,15 +452,20 @@ static void apply(void *self, float scale)
             store(d + i, load(q + i) * load(mg->now.inverse + at) * scale);
 }
 
+/* of the elements as they are without recovery, whose regions are softer, and end */
 static void find_lambda(pal_hex_multigrid *mg)
 {
     const int32_t *slot = mg->levels->body->node_order->slot;
+    pal_elastic_hexes_single *single = &mg->levels->single;
+    float *const acting = single->acting;
     const size_t n = (size_t)mg->levels->n_slot;
     memset(mg->levels->d, 0, 3 * sizeof *mg->levels->d * n);
     for (int i = 0; i < mg->levels->body->n_node; i++)
         for (size_t c = 0; c < 3 && mg->now.inverse[slot[i]] > 0; c++)
             mg->levels->d[(size_t)slot[i] + c * n] = pal_chebyshev_start(i, (int)c);
+    single->acting = single->stiff;
     mg->now.lambda = pal_chebyshev_lambda(size_of, apply, mg);
+    single->acting = acting;
 }
 
 double pal_hex_multigrid_rotate(pal_hex_multigrid *mg)
