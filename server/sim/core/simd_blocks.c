@@ -510,7 +510,7 @@ void pal_node_order_begin(pal_node_order *node_order, bool single, const double 
     node_order->shares = true;
     node_order->loaded = false;
     node_order->single = single && node_order->single_x;
-    memcpy(node_order->origin_m, x + 3 * (size_t)(node_order->n_node / 2), sizeof node_order->origin_m);
+    memcpy(node_order->origin_m, x + 3 * (size_t)pal_node_order_origin(node_order), sizeof node_order->origin_m);
     for (int p = 0; p < node_order->n_part; p++) { /* what parts are made of in units of the whole */
         pal_node_order *part = &node_order->part[p];
         part->single = node_order->single, part->unit_N = node_order->unit_N;

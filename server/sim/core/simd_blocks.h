@@ -26,7 +26,8 @@ typedef struct pal_node_order {
     int n_part;                  /* of an order that is divided between threads (pal_node_order_divide), else 0 */
     struct pal_node_order *part; /* the same slots with x and f of their own                        [n_part] */
     /* Positions and forces as x and f in single precision, NULL: not made. Positions are relative to a node in the
-     * middle of the list, in units of unit_m; forces in units of unit_N, the largest of the body's springs */
+     * middle of the list, in units of unit_m; forces in units of unit_N, the largest of the body's springs (0: none
+     * has stiffness) */
     float *single_x, *single_f;
     double unit_m, unit_N, origin_m[3];
     bool single; /* these are in use, and not x and f; between begin and end */
@@ -105,6 +106,11 @@ pal_err pal_part_blocks_make(const pal_simd_blocks *blocks, pal_node_order *node
  * first loads the part's own nodes, and their forces stay for the end */
 void pal_part_load(const pal_part_blocks *blocks, const pal_node_order *node_order, int part, const double *x);
 void pal_part_add(const pal_part_blocks *blocks, const pal_node_order *node_order, int part, double *force);
+/* the node that positions in single precision are relative to */
+static inline int pal_node_order_origin(const pal_node_order *node_order)
+{
+    return node_order->n_node / 2;
+}
 /* Components of one evaluation of forces share an order: positions are loaded once, and the sums of all are added once,
  * to force [n_node][3]. All of a body run in parts, or none. Elsewhere each loads and adds */
 /* single: in single precision, where the order has that; x [n_node][3]: the positions that will be loaded */

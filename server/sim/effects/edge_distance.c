@@ -89,7 +89,8 @@ static pal_err run(void *self, pal_step *step)
     const edge_distance *e = self;
     pal_body *body = step->body;
     spring_select(self, body);
-    const double min2 = step->single ? PAL_SPRING_SINGLE_SHORT * PAL_SPRING_SINGLE_SHORT : PAL_ROUNDING * PAL_ROUNDING;
+    const double min2 =
+        body->node_order->single ? PAL_SPRING_SINGLE_SHORT * PAL_SPRING_SINGLE_SHORT : PAL_ROUNDING * PAL_ROUNDING;
     if (spring_forces(&e->set, body) < min2) reopen(&e->set, body, min2);
     if (e->set.spring.c_Js > 0) pal_spring_damp(&e->set, body, PAL_SPRING_DISTANCE);
     return PAL_ERR_OK;

@@ -27,4 +27,9 @@ enum { PAL_FACTOR_FLOPS_PER_ENTRY = 20 };
  * roundings of positions of 16 voxels. With none, a part of 10,000 times the stiffness of the rest gains a third of its
  * energy in 100,000 sub-steps (test_spring_single) */
 #define PAL_SINGLE_MOVE 1e-4
+/* elements. A body with a node farther than this from the one that positions in single precision are relative to has
+ * forces in double precision. With none, the part of a body that came apart that is still held moves at 20 mm/s
+ * without end once the rest is 2,500 elements away, ten times as fast as PAL_SINGLE_MOVE stops; at 90 it comes to rest
+ * (test_spring_single) */
+#define PAL_SINGLE_REACH 100
 #endif

@@ -19,7 +19,7 @@
  * Forces of springs are in single precision (springs/spring_single.h) while a body with supports moves. Roundings of
  * its positions, 1e-6 of an element, are random kicks, which do not let it come to rest: where no node moves by a
  * hundred times as much in a sub-step, forces are in double precision. So are those of a free body, which would keep
- * what roundings of sums give it as momentum.
+ * what roundings of sums give it as momentum, and of one that reaches so far that the kicks alone keep it moving.
  *
  * Where the budget of sub-steps is exhausted (step->adds_mass), mass is added to the nodes that break the inequality at
  * PAL_FAST_SAFETY: such bodies are far from the shape that the bound is of.
@@ -49,7 +49,7 @@ typedef struct verlet {
     part_result *result;  /* of the last sub-step                              [n_part] */
     int n_since;          /* sub-steps since then                                */
     bool known;           /* stable_s holds                                      */
-    bool is_held;         /* a node is fixed or prescribed: momentum comes and goes, forces may be single */
+    bool suits_single;    /* forces may be in single precision where nodes move */
     bool has_inversion;   /* bounds must be computed again in the coming step */
 } verlet;
 
@@ -88,6 +88,19 @@ static double max_speed_m_s(const pal_body *body)
     return sqrt(max2);
 }
 
+/* a node is fixed or prescribed, so that momentum comes and goes, and all are near the one that positions are relative
+ * to */
+static bool suits_single(const pal_body *body)
+{
+    if (!body->node_order) return false;
+    const double *origin = body->d + 3 * (size_t)pal_node_order_origin(body->node_order);
+    bool held = false;
+    double far_m = 0;
+    for (int i = 0; i < body->n_dof; i++) held |= body->support[i] != 0;
+    for (int i = 0; i < body->n_node && held; i++) far_m = fmax(far_m, pal_dist3(body->d + 3 * i, origin));
+    return held && far_m <= PAL_SINGLE_REACH * body->edge_m;
+}
+
 /* safety times the smallest over free nodes of 2 t, t the positive root of t^2 K + t C = m */
 static double limit(void *self, pal_step *step)
 {
@@ -106,16 +119,15 @@ static double limit(void *self, pal_step *step)
     pal_guard_add_bounds(step->force, step->n_force, body, solver->stiff, solver->damp);
     pal_guard_add_bounds(step->contact, step->n_contact, body, solver->stiff, solver->damp);
     double min = INFINITY, sum = 0;
-    solver->is_held = false;
     for (int i = 0; i < body->n_dof; i++) {
         double k = solver->stiff[i], c = solver->damp[i], m = body->mass_kg[i];
         sum += 0 * k + 0 * c;
-        solver->is_held |= body->support[i] != 0;
         if (body->support[i] || k + c == 0) continue;
         double dt = 4 * m / (c + sqrt(c * c + 4 * k * m));
         if (dt < min) min = dt;
     }
     solver->stable_s = sum == 0 ? min : NAN;
+    solver->suits_single = suits_single(body);
     solver->moved_m = 0;
     solver->n_since = 0;
     solver->known = true;
@@ -178,10 +190,10 @@ static void move_part(void *user, int worker, int part)
     p->solver->result[part] = made;
 }
 
-/* moves far enough in a sub-step that roundings of positions are nothing beside, and is held */
+/* moves far enough in a sub-step that roundings of positions are nothing beside */
 static bool takes_single(const verlet *solver, const pal_body *body, double dt_s)
 {
-    return solver->is_held && solver->speed_m_s * dt_s > PAL_SINGLE_MOVE * body->edge_m;
+    return solver->suits_single && solver->speed_m_s * dt_s > PAL_SINGLE_MOVE * body->edge_m;
 }
 
 static pal_err run(void *self, pal_step *step)

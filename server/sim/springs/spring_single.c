@@ -147,7 +147,7 @@ double pal_spring_single_run(const pal_spring_set *set, const pal_node_order *or
                     .f = order->single_f,
                     .w = set->single_w,
                     .q = set->single_q,
-                    .k = (float)(set->spring.k_J / (order->unit_m * order->unit_N)),
+                    .k = order->unit_N > 0 ? (float)(set->spring.k_J / (order->unit_m * order->unit_N)) : 0,
                     .n_slot = (size_t)order->n_slot,
                     .blocks = &blocks};
     switch (set->spring.kind) {

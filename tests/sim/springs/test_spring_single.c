@@ -2,6 +2,7 @@
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/plan/plan.h"
+#include "server/sim/springs/spring_single.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 #include "tests/fixtures/boxes.h"
@@ -138,6 +139,78 @@ static void extreme_shapes_have_the_same_forces(void)
     bench_close(&b);
 }
 
+/* springs of no stiffness, which a scene may ask for, exert no force in either precision */
+static void springs_without_stiffness_exert_no_force(void)
+{
+    box_bench b;
+    const int size[3] = {3, 2, 2};
+    static const char *const keys[3] = {"k_distance_J", "k_area_J", "k_volume_J"};
+    REQUIRE(box_bench_make(&b, size, edge_m, true, true));
+    pal_body_def *def = &b.scene->body[0];
+    for (int k = 0; k < 3; k++) pal_entry_put_number(&def->model, keys[k], 0, NULL);
+    pal_entry_init(&def->effect[def->n_effect], "effects[1]", "edge_distance");
+    pal_entry_put_number(&def->effect[def->n_effect++], "k_J", 0, NULL);
+    def->material.damping_1_s = 0;
+    REQUIRE(box_bench_start(&b));
+    for (int i = 0; i < 3; i++) REQUIRE(!pal_world_step(b.world, b.scene->step_s));
+    CHECK_NEAR(b.body->v[3 * b.body->n_dof - 1], -9.81 * 3 * b.scene->step_s, 1e-9);
+    box_bench_close(&b);
+}
+
+/* Elastic tetrahedra with springs beside them have no positions in single precision: the same forces to the bit, also
+ * of an edge that would have no direction there */
+static void springs_of_another_model_keep_double_precision(void)
+{
+    bench b;
+    static double f[2][3 * NODES_MAX];
+    memset(&b, 0, sizeof b);
+    REQUIRE(!box_make(n[0], n[1], n[2], edge_m, &b.box));
+    b.scene = box_scene(&b.box, true, false);
+    b.arena = pal_arena_create(1 << 20, true);
+    pal_body_def *def = &b.scene->body[0];
+    pal_entry_init(&def->model, "model", "fem");
+    pal_entry_init(&def->solver, "solver", "verlet");
+    pal_entry_init(&def->effect[def->n_effect++], "effects[1]", "edge_distance");
+    REQUIRE(b.arena && !pal_plan_build(b.scene, b.arena, &b.diag, &b.plan));
+    b.body = &b.plan.body[0];
+    b.body->x[3] = b.body->x[0] + 0.1 * PAL_SPRING_SINGLE_SHORT * edge_m;
+    for (int k = 0; k < 2; k++) forces(&b, k == 1, false, f[k]);
+    CHECK(f[0][0] != 0 && !memcmp(f[0], f[1], 3 * sizeof(double) * (size_t)b.body->n_node));
+    bench_close(&b);
+}
+
+/* Half of a body that came apart is still held while the other half is 2,500 voxels away: roundings of positions do
+ * not keep it moving */
+static void a_body_that_came_apart_comes_to_rest(void)
+{
+    box_bench b;
+    const int size[3] = {9, 5, 4};
+    const double gap_m[2] = {0.04, 0.05};
+    double fastest = 0;
+    REQUIRE(box_bench_make(&b, size, edge_m, true, false));
+    pal_tets *tets = &b.box.tets;
+    const int n_whole = tets->n_tet;
+    tets->n_tet = 0;
+    for (int t = 0; t < n_whole; t++) {
+        double middle_m = 0;
+        for (int c = 0; c < 4; c++) middle_m += 0.25 * tets->x[3 * tets->tet[4 * t + c]];
+        if (middle_m < gap_m[0] || middle_m > gap_m[1])
+            memmove(tets->tet + 4 * tets->n_tet++, tets->tet + 4 * t, 4 * sizeof *tets->tet);
+    }
+    pal_body_def *def = &b.scene->body[0];
+    def->support[0] = (pal_support_def){.low_m = {0.085, -1, -1}, .high_m = {1, 1, 1}};
+    REQUIRE(box_bench_start(&b));
+    for (int i = 0; i < b.body->n_dof; i++)
+        if (b.body->x_rest[3 * i] < 0.5 * (gap_m[0] + gap_m[1]))
+            b.body->x[3 * i + 2] -= 25, b.body->v[3 * i + 2] = -0.5;
+    pal_world_invalidate_limits(b.world, 0);
+    for (int i = 0; i < 300; i++) REQUIRE(!pal_world_step(b.world, b.scene->step_s));
+    for (int i = 0; i < b.body->n_dof; i++) fastest = fmax(fastest, pal_norm3(b.body->v + 3 * i));
+    printf("  fastest node: %.2g m/s\n", fastest);
+    CHECK_LE(fastest, 1e-6);
+    box_bench_close(&b);
+}
+
 /* Mean energy of the last fifth of n_step steps is that of the first fifth, within a part `off` of it: a held body
  * without drag that was plucked, a part of it `contrast` times as stiff */
 static void keeps_energy(double poisson, double contrast, double speed_m_s, int n_step, double off)
@@ -185,6 +258,9 @@ int main(void)
     RUN(a_lattice_at_rest_has_no_force);
     RUN(a_collapsed_body_opens);
     RUN(extreme_shapes_have_the_same_forces);
+    RUN(springs_without_stiffness_exert_no_force);
+    RUN(springs_of_another_model_keep_double_precision);
+    RUN(a_body_that_came_apart_comes_to_rest);
     RUN(energy_stays_without_drag);
     return check_report();
 }
