@@ -494,9 +494,9 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau, bool 
         if (k < max) pal_system_linearise(&core->system);
         const double left = begin_iteration(core, tau, k == 0);
         /* while inverted elements move the state is far from any that is asked for, and conjugate gradients lower the
-         * energy of the stage in every iteration. The coarse levels know nothing of recovery: with 0.1 a drag of
-         * 14,119 nodes takes 5 iterations, with 0.3 two or three. A body that nothing touches has to come to rest, for
-         * which 0.2 is too much */
+         * energy of the stage in every iteration. While the preconditioner knew nothing of recovery, as its coarse
+         * levels still do, a drag of 14,119 nodes took 5 iterations with 0.1, two or three with 0.3. A body that
+         * nothing touches has to come to rest, for which 0.2 is too much */
         const double exponent = !core->turns_back ? 1 : core->system.has_contact ? 0.25 : 0.5;
         const double tolerance = pow(core->options.tolerance, exponent);
         double best = tolerance * core->reference;

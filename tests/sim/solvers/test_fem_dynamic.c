@@ -202,7 +202,6 @@ static void a_step_calls_no_heap(void)
         }
 }
 
-/* refreshed factors come into use at steps that do not depend on the clock, and a reset forgets them */
 /* without loads nothing is left to compare a residual with but rounding: a body that is as near to rest takes no
  * iteration, and no step looks as if it gained energy. Forces of PAL_UNLOADED_FLOOR move a node by 1e-11 of an edge
  * where a cube bears them, and a slender beam's end by (L/h)^3 times as much at most */
@@ -236,6 +235,7 @@ static void a_body_at_rest_without_loads_takes_no_iteration(void)
     }
 }
 
+/* refreshed factors come into use at steps that do not depend on the clock, and a reset forgets them */
 static void a_run_with_refreshed_factors_repeats(void)
 {
     uint64_t hash[3] = {0};
