@@ -243,7 +243,9 @@ static void a_sleeping_body_is_estimated_once(void)
     }
     check_age(e, tick, 0, fem->step_s);
     /* a load wakes it: until the next state is taken, the estimate is of its sleep and grows old */
-    CHECK(!pal_world_load(w, 0, 0, (double[3]){1e-3, 0, 0}));
+    const int free_node = pal_world_view_body(w, 0)->n_node - 1;
+    REQUIRE(!pal_world_view_body(w, 0)->support[free_node]);
+    CHECK(!pal_world_load(w, 0, free_node, (double[3]){1e-3, 0, 0}));
     hold_estimates = true;
     for (int n = 1; n <= 5; n++) {
         CHECK(!pal_world_step(w, fem->step_s));

@@ -369,7 +369,7 @@ begin "a recording survives kill -9, is not written over, and a closed terminal 
 "$palpate" serve scene --port 0 --open --record rec.bin >serve.out 2>serve.err &
 server=$!
 check "serve did not start" shows serve.out "$server" "http://"
-check "the file that is there was taken" has serve.err "rec.2.bin: records"
+check "the file that is there was taken" shows serve.err "$server" "rec.2.bin: records"
 check "nothing is recorded" grows rec.2.bin "$server" 1000
 kill -KILL "$server"
 wait "$server" 2>/dev/null

@@ -118,7 +118,8 @@ end
 begin "a body without damping does not come back, and that fails"
 gives 1 ringing --only meganewton --seconds 4
 check "it is safe, not recovered" has out "meganewton *failed *yes *no"
-check "it says so" has out "still moves .* S from rest"
+# by chance with an element inverted at that moment
+check "it says so" has out "[0-9] % S from rest after 11.0 s"
 end
 
 if long "a scene with a prescribed motion without end is compared with an unloaded run"; then
