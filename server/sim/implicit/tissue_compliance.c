@@ -78,12 +78,14 @@ static void reset(void *self)
     tissue->known = false;
 }
 
-/* the diagonal's inverse for the present topology: of the components' row sums where the body adapts, else 1 */
-static void find_diagonal(pal_tissue_compliance *tissue)
+/* the preconditioner for the present nodes: of the stiffness at rest; of a body that adapts, where it has not all of
+ * them, the inverse of the components' row sums; else 1 */
+static void find_preconditioner(pal_tissue_compliance *tissue)
 {
     const pal_step *step = &tissue->step;
     const pal_body *body = step->body;
-    if (tissue->preconditioned || (tissue->known && tissue->revision == body->display.revision)) return;
+    if (tissue->known && (!body->active || tissue->revision == body->display.revision)) return;
+    tissue->preconditioned = tissue->made && body->n_active == body->n_dof;
     memset(tissue->bound, 0, sizeof(double) * (size_t)body->n_node);
     if (body->active) pal_guard_add_bounds(step->force, step->n_force, body, tissue->bound, tissue->low);
     for (int i = 0; i < body->n_dof; i++)
@@ -202,7 +204,7 @@ static bool solve(void *self, const pal_body *body, const double *force_N, doubl
     pal_body *own = tissue->step.body;
     pal_tissue_answer *a = NULL;
     if (tissue->pauses) return false;
-    find_diagonal(tissue);
+    find_preconditioner(tissue);
     memcpy(tissue->x, own->x, 3 * sizeof(double) * (size_t)own->n_dof);
     memset(tissue->product, 0, 3 * sizeof(double) * (size_t)own->n_dof);
     if (body->interpolation)
@@ -238,7 +240,7 @@ static void destroy(void *self)
     pal_rest_preconditioner_destroy(&((pal_tissue_compliance *)self)->preconditioner);
 }
 
-/* for a body whose nodes are its dofs and stay. The factor goes on with the pattern; the values stay in rest->work */
+/* for a body whose dofs are all nodes now. The factor goes on with the pattern; the values stay in rest->work */
 static pal_err make_preconditioner(pal_tissue_compliance *tissue, const pal_system *system, pal_arena *arena,
                                    pal_rest_values *rest)
 {
@@ -275,12 +277,12 @@ pal_err pal_tissue_compliance_make(const pal_build *build, pal_rest_values *rest
         made = PAL_NEW_DOUBLES(arena, 3 * n, &a->force, &a->move, &a->left, &a->direction, &a->before);
     }
     if (!made) return PAL_ERR_MEMORY;
-    if (!body->interpolation && !body->active) {
+    if (!body->interpolation && body->n_active == body->n_dof) {
         PAL_TRY(pal_system_make(build, &system));
         pal_err err = make_preconditioner(tissue, &system, arena, rest);
         if (err == PAL_ERR_MEMORY) pal_rest_preconditioner_destroy(&tissue->preconditioner);
         if (err == PAL_ERR_MEMORY) return err;
-        tissue->preconditioned = err == PAL_ERR_OK;
+        tissue->made = err == PAL_ERR_OK;
     }
     tissue->hook = (pal_compliance){.self = tissue, .solve = solve, .begin = begin, .reset = reset, .destroy = destroy};
     body->compliance = &tissue->hook;

@@ -1,7 +1,7 @@
 /* Static compliance of a body with an explicit solver: the displacement u by a load, K u = f, at the present shape, by
  * conjugate gradients on the true stiffness. A product with K is a central difference of the components' forces. The
- * preconditioner is that of the stiffness at rest (rest_stiffness.h); for a body that adapts the row sums of its
- * springs; for control points none, which are few.
+ * preconditioner is that of the stiffness at rest (rest_stiffness.h); while a body that adapts has not all of its
+ * nodes, the row sums of its springs; for control points none, which are few.
  *
  * A product costs two evaluations of forces, so few are made in a step (PAL_PROBES_1_S), and the answer to a
  * load continues in the next one: residual and direction stay, the residual is found again as the body moves, and beta
@@ -37,7 +37,7 @@ typedef struct pal_tissue_compliance {
     double *x, *low, *product, *z; /* [n_dof][3] */
     double *inverse, *bound;       /* of the diagonal, m/N [n_dof]; row sums, N/m [n_node] */
     pal_block_matrix rest;         /* pattern of the stiffness at rest */
-    bool preconditioned;           /* by `preconditioner` */
+    bool made, preconditioned;     /* there is a preconditioner; it is that of the present nodes */
     pal_rest_preconditioner preconditioner;
     pal_tissue_answer answer[PAL_TISSUE_ANSWERS];
 } pal_tissue_compliance;
