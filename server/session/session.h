@@ -5,8 +5,9 @@
  * n_late, the number of steps that began a tenth of a step or more after their due time. Input does not accumulate:
  * the newest pose of a tool wins, and at most 64 commands are taken before a step. While paused, a command or a pose
  * publishes a frame, in which tools follow their holders. A tool without a pose for lease_s is released; its force
- * ramps out over PAL_BLEND_S (server/sim/core/blend.h). While all bodies sleep and nobody looks, holds a tool or gives
- * a command, steps of PAL_REST_NS are taken together, with one frame; who comes ends such a rest at once.
+ * ramps out over PAL_BLEND_S (server/sim/core/blend.h). While nothing moves (all bodies sleep, it is paused, or the
+ * recording that it plays has ended) and nobody looks, holds a tool or gives a command, the thread rests for
+ * PAL_REST_NS at a time; steps of that time are taken together, with one frame. Who comes ends such a rest at once.
  *
  * Threads exchange data through triple buffers (poses, frames), a command queue and the wake callback. A lock guards
  * only the diagnostic of pal_session_last_diagnostic, the materials, the place in a recording that plays, and a rest.

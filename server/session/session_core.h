@@ -110,6 +110,8 @@ static inline uint64_t session_now_ns(const pal_session *s)
     return pal_clock_now_ns(s->options.clock);
 }
 
+/* [sim] does its next turn make a step? It is not paused, and what it plays has not ended */
+bool pal_session_moves(const pal_session *session);
 /* [sim] Waits for the due time; a step at least one whole step late is due now, and the missed ones are dropped.
  * Returns how many steps are due, more than one after a rest; 0: the thread is to end */
 int pal_session_pace(pal_session *session, uint64_t *due);

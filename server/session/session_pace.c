@@ -1,5 +1,5 @@
-/* When the steps of a session are due, and how its thread waits for them. While all bodies sleep and nobody looks, it
- * rests for several steps, which are taken together afterwards. */
+/* When the steps of a session are due, and how its thread waits for them. While nothing moves and nobody looks, it
+ * rests for several steps, which are taken together afterwards; of a session that stands there are none. */
 #include "server/session/session_core.h"
 
 #include "server/session/tuning.h"
@@ -11,11 +11,19 @@ static bool is_stopped(const pal_session *s)
     return atomic_load_explicit(&s->stop, memory_order_acquire);
 }
 
+bool pal_session_moves(const pal_session *s)
+{
+    return (!s->paused || s->single > 0) && (!s->play || s->playing.state == PAL_PLAYS);
+}
+
 /* does nothing change until somebody looks, holds a tool or gives a command? */
 static bool is_idle(const pal_session *s)
 {
-    bool idle = !s->observed && !s->paused && !s->play && !s->options.unpaced;
-    for (int b = 0; b < pal_world_body_count(s->world) && idle; b++) idle = pal_world_body(s->world, b)->asleep;
+    bool idle = !s->observed;
+    if (idle && pal_session_moves(s)) {
+        idle = !s->play && !s->options.unpaced;
+        for (int b = 0; b < pal_world_body_count(s->world) && idle; b++) idle = pal_world_body(s->world, b)->asleep;
+    }
     for (int t = 0; t < s->scene->n_tool && idle; t++) idle = !s->tool[t].present;
     return idle;
 }

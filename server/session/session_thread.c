@@ -1,7 +1,7 @@
 /* The simulation thread: takes commands and the newest poses, steps the world, publishes a frame, and sleeps until the
  * next absolute time. It waits for no other thread: poses and frames use triple buffers, commands a queue. The only
  * lock guards the last diagnostic, the materials and the place in a recording, and a rest; an ordinary step does not
- * take it. While all bodies sleep and nobody looks, the thread rests for several steps, which it takes together
+ * take it. While nothing moves and nobody looks, the thread rests for several steps, which it takes together
  * afterwards.
  *
  * Slowdown is real time over simulated time since a mark that is 1 to 1 + 1/16 s old. */
@@ -326,14 +326,14 @@ static void *simulate(void *user)
     publish(s);
     for (int n; (n = pal_session_pace(s, &due)) > 0;) {
         /* those of a rest, in which nothing came */
-        for (int k = 1; k < n; k++) step(s);
+        for (int k = 1; k < n && pal_session_moves(s); k++) step(s);
         atomic_store(&s->called, false);
         bool changed = take_commands(s);
         uint64_t now = session_now_ns(s);
         atomic_store_explicit(&s->beat_ns, now, memory_order_relaxed);
         changed = (s->play ? pal_session_play(s) : take_poses(s, now)) || changed;
         changed = update_observed(s) || changed;
-        bool moves = (!s->paused || s->single > 0) && (!s->play || s->playing.state == PAL_PLAYS);
+        const bool moves = pal_session_moves(s);
         if (moves) {
             step(s);
             mark_pace(s, s->end_ns);

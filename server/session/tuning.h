@@ -8,9 +8,9 @@
 #define PAL_POSE_REACH 100
 /* fraction of a step: a step is late when it begins so long after its due time (test_session) */
 #define PAL_LATE_PART 0.1
-/* ns that a session rests at a time while all of its bodies sleep and nobody looks or holds a tool; its steps are taken
- * together after that. 200 such sessions on one core wake 2,000 times a second in place of 12,000 (test_session,
- * tests/bench) */
+/* ns that a session rests at a time while nothing moves (its bodies sleep, or it is paused) and nobody looks or holds a
+ * tool; its steps are taken together after that. 200 such sessions on one core wake 2,000 times a second in place of
+ * 12,000 (test_session, tests/bench) */
 #define PAL_REST_NS 100000000u
 /* share of the last step in the smoothed time of a sub-step: some steps, so that one that was interrupted
  * counts for little (test_session) */

@@ -185,6 +185,36 @@ static void a_session_at_rest_wakes_ten_times_a_second(void)
     pal_session_close(s);
 }
 
+/* paused, with a body that is not at rest: the same rests, without steps */
+static void a_paused_session_that_nobody_sees_wakes_ten_times_a_second(void)
+{
+    pal_session *s = open_with((pal_session_options){.only_observed = true});
+    REQUIRE(s != NULL);
+    (void)stepped_steps(s, 10);
+    CHECK_INT(stepped_order(s, PAL_COMMAND_PAUSE), 0);
+    (void)stepped_steps(s, 1);
+    const uint64_t before = stepped_clock.n_sleep, began = stepped_newest(s)->tick;
+    (void)stepped_steps(s, 100);
+    CHECK_INT(stepped_clock.n_sleep - before, 5);
+    CHECK(pal_session_is_alive(s));
+    /* half a step into a rest somebody orders a step, and into another one goes on */
+    manual_clock_advance(&stepped_clock, STEP_NS / 2);
+    CHECK_INT(stepped_order(s, PAL_COMMAND_STEP), 0);
+    manual_clock_settle(&stepped_clock, 1);
+    manual_clock_advance(&stepped_clock, STEP_NS / 2);
+    manual_clock_settle(&stepped_clock, 1);
+    const pal_frame *f = stepped_newest(s);
+    CHECK(f->paused);
+    CHECK_INT(f->tick - began, 1);
+    (void)stepped_steps(s, 30);
+    CHECK_INT(stepped_order(s, PAL_COMMAND_RESUME), 0);
+    f = stepped_steps(s, 10);
+    CHECK_INT(f->tick - began, 11);
+    CHECK_NEAR(f->slowdown, 1, 1e-9);
+    CHECK_INT(f->n_late, 0);
+    pal_session_close(s);
+}
+
 static void a_session_that_starts_paused_shows_rest_and_steps_one_by_one(void)
 {
     pal_session *s = open_with((pal_session_options){.start_paused = true});
@@ -672,6 +702,7 @@ int main(void)
     RUN(a_tool_that_jumps_is_lifted_until_it_rests);
     RUN(steps_follow_the_clock_and_time_is_ticks_times_step);
     RUN(a_session_at_rest_wakes_ten_times_a_second);
+    RUN(a_paused_session_that_nobody_sees_wakes_ten_times_a_second);
     RUN(a_session_that_starts_paused_shows_rest_and_steps_one_by_one);
     RUN(reset_brings_the_rest_shape_back);
     RUN(the_newest_pose_wins_and_is_echoed_with_its_arrival_time);
