@@ -20,6 +20,12 @@ uint64_t pal_clock_thread_ns(void)
     return read_ns(CLOCK_THREAD_CPUTIME_ID);
 }
 
+uint64_t pal_clock_thread_of_ns(pthread_t thread)
+{
+    clockid_t clock;
+    return pthread_getcpuclockid(thread, &clock) ? 0 : read_ns(clock);
+}
+
 double pal_clock_s(void)
 {
     return 1e-9 * (double)pal_clock_ns();

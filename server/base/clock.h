@@ -1,12 +1,14 @@
 /* Monotonic time, pacing, and clocks that tests advance by hand. Thread: any. */
 #ifndef PAL_BASE_CLOCK_H
 #define PAL_BASE_CLOCK_H
+#include <pthread.h>
 #include <stdint.h>
 
-uint64_t pal_clock_ns(void);                  /* CLOCK_MONOTONIC */
-uint64_t pal_clock_thread_ns(void);           /* processor time of the calling thread */
-double pal_clock_s(void);                     /* pal_clock_ns in seconds */
-void pal_clock_sleep_until_ns(uint64_t when); /* absolute; signals do not end it */
+uint64_t pal_clock_ns(void);                       /* CLOCK_MONOTONIC */
+uint64_t pal_clock_thread_ns(void);                /* processor time of the calling thread */
+uint64_t pal_clock_thread_of_ns(pthread_t thread); /* of another one, which has not been joined */
+double pal_clock_s(void);                          /* pal_clock_ns in seconds */
+void pal_clock_sleep_until_ns(uint64_t when);      /* absolute; signals do not end it */
 
 /* The time that leases, pacing and deadlines refer to. Where a clock is an option, NULL means pal_clock_monotonic;
  * tests give one of their own (tests/fixtures/manual_clock.h). Durations of work (profiles, prices) are always measured

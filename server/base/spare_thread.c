@@ -1,6 +1,9 @@
 #include "server/base/spare_thread.h"
 
+#include "server/base/clock.h"
 #include "server/base/thread.h"
+
+static _Thread_local uint64_t waited_ns;
 
 void pal_spare_thread_init(pal_spare_thread *spare)
 {
@@ -41,8 +44,17 @@ pal_err pal_spare_thread_run(pal_spare_thread *spare, void (*job)(void *user), v
 void pal_spare_thread_wait(pal_spare_thread *spare)
 {
     pthread_mutex_lock(&spare->lock);
-    while (spare->busy) pthread_cond_wait(&spare->changed, &spare->lock);
+    if (spare->busy) {
+        const uint64_t before = pal_clock_thread_of_ns(spare->thread);
+        while (spare->busy) pthread_cond_wait(&spare->changed, &spare->lock);
+        waited_ns += pal_clock_thread_of_ns(spare->thread) - before;
+    }
     pthread_mutex_unlock(&spare->lock);
+}
+
+uint64_t pal_spare_thread_waited_ns(void)
+{
+    return waited_ns;
 }
 
 void pal_spare_thread_destroy(pal_spare_thread *spare)

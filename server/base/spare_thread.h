@@ -7,6 +7,7 @@
 
 #include <pthread.h>
 #include <stdbool.h>
+#include <stdint.h>
 
 typedef struct pal_spare_thread {
     bool made, busy, quit; /* made: the owner's; busy and quit: under the lock */
@@ -22,4 +23,6 @@ void pal_spare_thread_destroy(pal_spare_thread *spare); /* waits for the job; [l
 /* starts a job, after the one before has ended. MEMORY: no thread could be created, the job does not run */
 pal_err pal_spare_thread_run(pal_spare_thread *spare, void (*job)(void *user), void *user);
 void pal_spare_thread_wait(pal_spare_thread *spare); /* until it has no job */
+/* processor time of spare threads while the calling thread waited for them, ns, in all */
+uint64_t pal_spare_thread_waited_ns(void);
 #endif

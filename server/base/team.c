@@ -8,6 +8,7 @@
  */
 #include "server/base/team.h"
 
+#include "server/base/clock.h"
 #include "server/base/subnormals.h"
 #include "server/base/thread.h"
 
@@ -202,6 +203,14 @@ void pal_team_destroy(pal_team *team)
 int pal_team_size(const pal_team *team)
 {
     return team->size;
+}
+
+uint64_t pal_team_mean_ns(const pal_team *team, uint64_t own_ns)
+{
+    uint64_t sum = own_ns;
+    if (!team) return own_ns;
+    for (int i = 0; i < team->n_thread; i++) sum += pal_clock_thread_of_ns(team->worker[i].thread);
+    return sum / (uint64_t)team->size;
 }
 
 static void wake_workers(pal_team *team, int n)

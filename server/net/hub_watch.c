@@ -37,8 +37,9 @@ static bool is_undone(const pal_hub_room *room, const pal_hub_undo *undo)
 
 /* Takes back the newest order that was given from since_ns to until_ns, passing over those that have changed nothing,
  * as the session refused them. false: there is none */
-static bool take_back(pal_hub_room *room, uint64_t since_ns, uint64_t until_ns, double slowdown)
+static bool take_back(pal_hub_room *room, uint64_t since_ns, uint64_t until_ns, double load)
 {
+    const double step_ms = 1e3 * pal_session_scene(room->session)->step_s;
     int k = room->n_undo - 1;
     while (k >= 0 && (is_undone(room, &room->undo[k]) || room->undo[k].at_ns >= until_ns)) k--;
     if (k < 0 || room->undo[k].at_ns < since_ns) return false;
@@ -48,8 +49,8 @@ static bool take_back(pal_hub_room *room, uint64_t since_ns, uint64_t until_ns, 
     if (undo.kind == PAL_UNDO_COMMAND) done = pal_session_command(room->session, &undo.command) == PAL_ERR_OK;
     if (undo.kind == PAL_UNDO_SWITCH) done = pal_hub_switch_to(room, undo.body, &undo.configuration, 0);
     if (undo.kind == PAL_UNDO_EDIT) done = pal_hub_undo_edit(room, undo.body, !strcmp(undo.verb, "undo"));
-    pal_hub_notice(room, "undone", "%s by %s %s: the simulation ran %.1f times slower than real time", undo.verb,
-                   undo.name, done ? "was taken back" : "could not be taken back", slowdown);
+    pal_hub_notice(room, "undone", "%s by %s %s: a step took %.3g ms of its %.3g ms", undo.verb, undo.name,
+                   done ? "was taken back" : "could not be taken back", load * step_ms, step_ms);
     return true;
 }
 
@@ -118,11 +119,12 @@ void pal_hub_watch_pace(pal_hub_room *room)
         room->slow_ns = room->quality.slow_ns = room->quality.spare_ns = 0;
         return;
     }
-    /* one order after the other, each with the time to show that it was the one */
-    const uint64_t slow_ns = held_for(f->slowdown > PAL_SLOW_MAX, &room->slow_ns, now);
+    /* One order after the other, each with the time to show that it was the one. By processor time: what others make of
+     * a machine slows the session too, and no order is to blame for it */
+    const uint64_t slow_ns = held_for(f->load > PAL_SLOW_MAX, &room->slow_ns, now);
     const uint64_t since_ns = room->slow_ns > PAL_BLAME_NS ? room->slow_ns - PAL_BLAME_NS : 0;
     if (slow_ns > PAL_SLOW_NS && now > room->undone_ns + PAL_SLOW_NS && !pal_hub_jobs_own(room) &&
-        take_back(room, since_ns, room->slow_ns + PAL_BLAME_NS, f->slowdown))
+        take_back(room, since_ns, room->slow_ns + PAL_BLAME_NS, f->load))
         room->undone_ns = now;
     if (pal_session_scene(room->session)->keep_real_time) keep_real_time(room, f, now);
 }

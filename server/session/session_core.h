@@ -41,9 +41,9 @@ typedef struct disabled_components {
     } at[DISABLED_MAX]; /* any beyond these are enabled again by a switch */
 } disabled_components;
 
-/* a time and the number of steps taken until then */
+/* a time, the number of steps taken until then, and their processor time */
 typedef struct mark {
-    uint64_t ns, step;
+    uint64_t ns, step, work_ns;
 } mark;
 
 struct pal_session {
@@ -91,7 +91,7 @@ struct pal_session {
     uint64_t state_step;           /* when the record gets the next state */
     uint64_t state_work_ns;        /* processor time of the steps since the last one */
     uint64_t n_late;               /* steps that began late */
-    uint64_t work_ns;              /* processor time of the last step */
+    uint64_t work_ns, all_work_ns; /* processor time of the last step, of all since open */
     double substep_ns;             /* smoothed processor time of a sub-step while no body sleeps, at first as
                                       predicted; 0: unknown */
     uint64_t transferred_ns;       /* after a transfer: when the predecessor was asked to stop */

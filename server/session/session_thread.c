@@ -4,7 +4,8 @@
  * take it. While nothing moves and nobody looks, the thread rests for several steps, which it takes together
  * afterwards.
  *
- * Slowdown is real time over simulated time since a mark that is 1 to 1 + 1/16 s old. */
+ * Slowdown is real time over simulated time since a mark that is 1 to 1 + 1/16 s old, load the processor time of the
+ * steps over it. */
 #include "server/session/session_core.h"
 
 #include "server/base/log.h"
@@ -47,17 +48,18 @@ static void mark_pace(pal_session *s, uint64_t now)
         s->n_marks--;
     }
     if (s->n_marks == size) s->first = (s->first + 1) % size, s->n_marks--;
-    s->marks[(s->first + s->n_marks++) % size] = (mark){now, s->step};
+    s->marks[(s->first + s->n_marks++) % size] = (mark){now, s->step, s->all_work_ns};
 }
 
-/* the estimate needs at least 0.1 s and one step */
-static double slowdown(const pal_session *s)
+/* real time and processor time over simulated time; they need at least 0.1 s and one step */
+static void measure_pace(const pal_session *s, pal_frame *frame)
 {
-    if (s->n_marks == 0) return 1;
     const mark *oldest = &s->marks[s->first];
-    uint64_t real = s->end_ns - oldest->ns, n = s->step - oldest->step;
-    if (s->end_ns <= oldest->ns || real < SECOND_NS / 10 || n == 0) return 1;
-    return s->speed * (double)real / ((double)n * (double)s->step_ns);
+    frame->slowdown = 1, frame->load = 0;
+    if (s->paused || s->n_marks == 0 || s->end_ns < oldest->ns + SECOND_NS / 10 || s->step == oldest->step) return;
+    const double simulated_ns = (double)(s->step - oldest->step) * (double)s->step_ns;
+    frame->slowdown = s->speed * (double)(s->end_ns - oldest->ns) / simulated_ns;
+    frame->load = (double)(s->all_work_ns - oldest->work_ns) / simulated_ns;
 }
 
 static void publish(pal_session *s)
@@ -69,7 +71,7 @@ static void publish(pal_session *s)
     frame->step_ns = s->work_ns;
     frame->paused = s->paused;
     frame->plays = s->play != NULL;
-    frame->slowdown = s->paused ? 1 : slowdown(s);
+    measure_pace(s, frame);
     frame->n_late = s->n_late;
     frame->n_refused = atomic_load_explicit(&s->n_refused, memory_order_relaxed);
     for (int t = 0; t < frame->n_tool; t++) {
@@ -295,10 +297,10 @@ static size_t ring_bytes(const pal_session *s)
 static void step(pal_session *s)
 {
     if (s->n_marks == 0) mark_pace(s, session_now_ns(s));
-    uint64_t before = pal_clock_thread_ns();
     pal_err err = pal_world_step(s->world, s->scene->step_s);
     pal_world_remove_idle(s->world);
-    s->work_ns = pal_clock_thread_ns() - before;
+    s->work_ns = pal_world_step_ns(s->world);
+    s->all_work_ns += s->work_ns;
     time_substep(s);
     s->end_ns = session_now_ns(s);
     s->step++;

@@ -61,12 +61,13 @@ typedef struct pal_frame {
     uint64_t tick;    /* steps since create or reset; equal ticks may differ in tools or status */
     double time_s;    /* simulated                                                              */
     uint64_t end_ns;  /* of the session's clock, at the end of the step */
-    uint64_t step_ns; /* processor time of the step                                              */
+    uint64_t step_ns; /* processor time of the step (pal_world_step_ns) */
     int n_substep;
     bool watched; /* positions are of this tick; false: there are no observers, and positions may be older */
     /* filled by the session */
     bool paused, plays; /* plays: a recording, whose tools these are */
     double slowdown;    /* real over simulated time, 1: real time (mean over the last second) */
+    double load;        /* processor time of the steps over simulated time, likewise; 0: not known yet */
     uint64_t n_late;    /* steps that started late */
     uint64_t n_refused; /* poses and commands refused                                              */
     int n_part;

@@ -2,6 +2,7 @@
 #include "server/sim/world/world.h"
 
 #include "server/base/clock.h"
+#include "server/base/spare_thread.h"
 #include "server/base/vec3.h"
 #include "server/sim/core/step_guard.h"
 #include "server/sim/implicit/lowest_frequency.h"
@@ -445,13 +446,19 @@ static int count_frozen(const pal_world *w)
     return n;
 }
 
+/* processor time of those on whom a step waits */
+static uint64_t work_ns(const pal_world *w)
+{
+    return pal_team_mean_ns(w->team, pal_clock_thread_ns() + pal_spare_thread_waited_ns());
+}
+
 pal_err pal_world_step(pal_world *world, double dt_s)
 {
     pal_world *w = world;
     if (!(dt_s > 0) || !isfinite(dt_s)) return PAL_ERR_REFUSED;
     /* a step that is too long at rest is refused; deformation is handled during the step */
     if (count_substeps(w, dt_s, w->rest_limit_s) > w->max_substep) return PAL_ERR_BUDGET;
-    uint64_t began = pal_clock_thread_ns();
+    const uint64_t began = work_ns(w);
     int frozen = count_frozen(w);
     for (int i = 0; i < w->plan.n_component; i++) w->plan.component[i].spent_ns = 0;
     for (int t = 0; t < w->tools.n_tool; t++)
@@ -467,12 +474,17 @@ pal_err pal_world_step(pal_world *world, double dt_s)
     run_stage(w, PAL_STAGE_GUARD, dt_s);
     run_stage(w, PAL_STAGE_OUTPUT, dt_s);
     pal_team_release(w->team);
-    w->step_ns = pal_clock_thread_ns() - began;
+    w->step_ns = work_ns(w) - began;
     w->end_ns = pal_clock_ns();
     return w->component_err ? w->component_err : count_frozen(w) > frozen ? PAL_ERR_FROZEN : PAL_ERR_OK;
 }
 
 /* ---- read access; frames and shown surfaces are in world_show.c ---- */
+
+uint64_t pal_world_step_ns(const pal_world *world)
+{
+    return world->step_ns;
+}
 
 double pal_world_limit_s(const pal_world *world)
 {

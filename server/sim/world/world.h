@@ -41,6 +41,9 @@ void pal_world_place_tools(pal_world *world);
  * returned and its body is frozen. In both cases the other bodies advance. If only deformation exceeds the budget,
  * the step continues with scaled masses (body.safeguards.n_mass_scaled). [sim] */
 pal_err pal_world_step(pal_world *world, double dt_s);
+/* Processor time of the last step, ns: what it would take on a machine without other work. Of a team it is the mean
+ * over its threads, and includes spare threads while the step waited for them. [sim] */
+uint64_t pal_world_step_ns(const pal_world *world);
 /* resets every body to rest, releases tools, sets time to 0. [sim] */
 void pal_world_reset(pal_world *world);
 /* Resets one body to rest as at load and unfreezes it; its lasting loads and brushes end and tools release it. Other
