@@ -146,6 +146,16 @@ static void steps_follow_the_clock_and_time_is_ticks_times_step(void)
     pal_session_close(s);
 }
 
+/* half a step goes by, then a command ends the rest, then the other half */
+static void order_between_steps(pal_session *s, pal_command_kind kind)
+{
+    manual_clock_advance(&stepped_clock, STEP_NS / 2);
+    CHECK_INT(stepped_order(s, kind), 0);
+    manual_clock_settle(&stepped_clock, 1);
+    manual_clock_advance(&stepped_clock, STEP_NS / 2);
+    manual_clock_settle(&stepped_clock, 1);
+}
+
 /* of a sleeping body that nobody sees, the steps of a tenth of a second are taken together: no time is lost, no step
  * is late, and who looks or gives a command is answered with the next step */
 static void a_session_at_rest_wakes_ten_times_a_second(void)
@@ -169,11 +179,7 @@ static void a_session_at_rest_wakes_ten_times_a_second(void)
         /* seven and a half steps into a rest somebody gives a command, and then into another comes */
         f = stepped_steps(s, 7);
         CHECK_INT(f->tick - began, 100);
-        manual_clock_advance(&stepped_clock, STEP_NS / 2);
-        CHECK_INT(stepped_order(s, PAL_COMMAND_PAUSE), 0);
-        manual_clock_settle(&stepped_clock, 1);
-        manual_clock_advance(&stepped_clock, STEP_NS / 2);
-        manual_clock_settle(&stepped_clock, 1);
+        order_between_steps(s, PAL_COMMAND_PAUSE);
         f = stepped_newest(s);
         CHECK(f->paused);
         CHECK_INT(f->tick - began, 107);
@@ -197,18 +203,13 @@ static void a_paused_session_that_nobody_sees_wakes_ten_times_a_second(void)
     (void)stepped_steps(s, 100);
     CHECK_INT(stepped_clock.n_sleep - before, 5);
     CHECK(pal_session_is_alive(s));
-    /* half a step into a rest somebody orders a step, and into another one goes on */
-    manual_clock_advance(&stepped_clock, STEP_NS / 2);
-    CHECK_INT(stepped_order(s, PAL_COMMAND_STEP), 0);
-    manual_clock_settle(&stepped_clock, 1);
-    manual_clock_advance(&stepped_clock, STEP_NS / 2);
-    manual_clock_settle(&stepped_clock, 1);
-    const pal_frame *f = stepped_newest(s);
-    CHECK(f->paused);
-    CHECK_INT(f->tick - began, 1);
+    /* half a step into a rest somebody orders a step, and half a step into another that the session goes on */
+    order_between_steps(s, PAL_COMMAND_STEP);
+    CHECK(stepped_newest(s)->paused);
+    CHECK_INT(stepped_newest(s)->tick - began, 1);
     (void)stepped_steps(s, 30);
-    CHECK_INT(stepped_order(s, PAL_COMMAND_RESUME), 0);
-    f = stepped_steps(s, 10);
+    order_between_steps(s, PAL_COMMAND_RESUME);
+    const pal_frame *f = stepped_steps(s, 9);
     CHECK_INT(f->tick - began, 11);
     CHECK_NEAR(f->slowdown, 1, 1e-9);
     CHECK_INT(f->n_late, 0);
