@@ -21,6 +21,7 @@
 #define BODY_VERSION   2
 #define POSE_RATE_HZ   245.0 /* the server allows 250 */
 #define POSE_BURST     10.0
+#define POSE_EDGES     4.0 /* of these for states at which the grasp changes */
 #define SILENCE_NS     5000000000u
 #define REPEAT_NS      1000000000u
 #define RESTARTED_NS   1000000000u  /* after this pause a sender without seal may count from the start again */
@@ -31,6 +32,7 @@ typedef struct bridge_tool {
     pal_link *link; /* NULL: no member */
     int index;
     double tokens;
+    bool grasps; /* in the last pose */
     uint32_t seq;
     uint64_t last_ns, source; /* of the last state */
 } bridge_tool;
@@ -363,8 +365,11 @@ static void bridge_state(pal_lcm_bridge *b, int index, const void *bytes, size_t
     tool->tokens = tool->tokens + POSE_RATE_HZ * 1e-9 * (double)silence;
     if (tool->tokens > POSE_BURST) tool->tokens = POSE_BURST;
     if (!tool->link) tool_open(b, tool);
-    if (!tool->link || pal_link_tool(tool->link) != index || tool->tokens < 1) return;
+    const bool grasps = pose.buttons & PAL_WIRE_GRASP;
+    const double needed = grasps == tool->grasps ? 1 + POSE_EDGES : 1;
+    if (!tool->link || pal_link_tool(tool->link) != index || tool->tokens < needed) return;
     tool->tokens -= 1;
+    tool->grasps = grasps;
     pal_link_send_pose(tool->link, &pose);
 }
 

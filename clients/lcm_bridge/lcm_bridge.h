@@ -2,8 +2,8 @@
  *
  * One member takes frames and status to LCM, and gives the orders of the bus by the role that its ticket allows; each
  * tool whose states come in on <prefix>/<session>/TOOL/<n> gets a trainee member of its own that takes tool n, passes
- * the newest state on as POSE (at most 245 a second) and brings HAPTIC back as HMODEL/<n>; after 5 s of silence it
- * gives the tool back. Types: lcmtypes/. Out:
+ * the newest state on as POSE (at most 245 a second, first of all those at which the grasp changes) and brings HAPTIC
+ * back as HMODEL/<n>; after 5 s of silence it gives the tool back. Types: lcmtypes/. Out:
  *   - BODY/<part>, body_frame_t: the FRAME message byte for byte. Repeated after 1 s without change, so that a late
  *     listener sees a part at rest. Longer than a datagram: in fragments, of which none may be lost, so a listener's
  *     receive buffer must hold the frame.

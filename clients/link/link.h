@@ -6,8 +6,9 @@
  *
  * A link connects and joins. After a loss it reconnects by timer, with pauses that double from 0.25 s to 5 s, until it
  * is closed or the server refuses permanently (protocol/README.md, "Closing"). A server that ends may name another one
- * (`move`): the link goes there, and tells its user like any other message. Sending never blocks: the newest pose
- * and the newest acknowledgement wait in one slot each, control messages in a queue of 16. One message is written each
+ * (`move`): the link goes there, and tells its user like any other message. Sending never blocks: the newest
+ * pose, with the last ones at which its grasp changed, and the newest acknowledgement wait, control messages in a queue
+ * of 16. One message is written each
  * time the socket is writable, control first. wss and https URLs use TLS: the server's certificate must be signed by an
  * authority of the system, or by that of the PEM file that the environment variable PALPATE_CA names; that of
  * this machine itself is not checked.
@@ -82,7 +83,8 @@ pal_link_state pal_link_current_state(const pal_link *link);
 /* tool that the member holds by the newest hello or members; PAL_WIRE_TOOL_NONE: none, or not connected */
 int pal_link_tool(const pal_link *link);
 
-/* the newest wins; STATE: not joined; REFUSED: a number is not finite. [net] */
+/* the newest wins, but those at which the grasp changes or the tool leaves are sent too (signal_edges.h); STATE: not
+ * joined; REFUSED: a number is not finite. [net] */
 pal_err pal_link_send_pose(pal_link *link, const pal_wire_pose *pose);
 pal_err pal_link_send_ack(pal_link *link, const pal_wire_ack *ack);
 /* acknowledges the cycle that a TOOLS message closes; a malformed message is ignored */

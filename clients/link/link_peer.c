@@ -1,5 +1,6 @@
 #include "clients/link/link_core.h"
 #include "server/base/clock.h"
+#include "server/base/signal_edges.h"
 
 #include <netinet/tcp.h>
 #include <stdio.h>
@@ -37,8 +38,10 @@ struct pal_link {
     lws_sorted_usec_list_t retry, resume;
     link_bytes in; /* message being put together */
     bool in_drop;
-    bool has_pose, has_ack;
-    uint8_t pose[PAL_WIRE_POSE_BYTES], ack[PAL_WIRE_ACK_BYTES];
+    bool has_ack, away, grasps; /* of the last pose */
+    pal_signal_edges poses;     /* that wait */
+    uint64_t sent_pose;         /* number of the last one that does not */
+    uint8_t pose[PAL_EDGE_SLOTS][PAL_WIRE_POSE_BYTES], ack[PAL_WIRE_ACK_BYTES];
     int n_queued, queue_first;
     size_t queued_bytes[LINK_QUEUE];
     char queued[LINK_QUEUE][PAL_CONTROL_IN_MAX + 1];
@@ -95,7 +98,8 @@ static bool link_may_return(int code)
 static void link_lost(pal_link *link, const char *reason)
 {
     link->wsi = NULL;
-    link->up = link->has_pose = link->has_ack = false;
+    link->up = link->has_ack = link->away = link->grasps = false;
+    link->sent_pose = link->poses.n_value;
     link->n_queued = 0;
     link->in.n = 0;
     link->in_drop = false;
@@ -216,8 +220,11 @@ pal_err pal_link_send_pose(pal_link *link, const pal_wire_pose *pose)
     /* what the server would refuse is not sent */
     if (!pal_wire_put_pose(bytes, sizeof bytes, pose) || pal_wire_get_pose(bytes, sizeof bytes, &back))
         return PAL_ERR_REFUSED;
-    memcpy(link->pose, bytes, sizeof bytes);
-    link->has_pose = true;
+    const bool away = pose->flags & PAL_WIRE_POSE_AWAY, grasps = !away && (pose->buttons & PAL_WIRE_GRASP);
+    const int edge = pal_signal_edges_put(&link->poses, grasps != link->grasps || (away && !link->away));
+    link->away = away, link->grasps = grasps;
+    memcpy(link->pose[PAL_EDGE_NEWEST], bytes, sizeof bytes);
+    if (edge >= 0) memcpy(link->pose[edge], bytes, sizeof bytes);
     link_want_write(link);
     return PAL_ERR_OK;
 }
@@ -261,6 +268,7 @@ static int link_write(pal_link *link, struct lws *wsi)
     uint8_t buffer[LWS_PRE + PAL_CONTROL_IN_MAX];
     const void *from;
     size_t n;
+    int pose = pal_signal_edges_next(&link->poses, link->sent_pose);
     enum lws_write_protocol kind = LWS_WRITE_BINARY;
     if (link->closing) {
         lws_close_reason(wsi, LWS_CLOSE_STATUS_NORMAL, NULL, 0);
@@ -272,10 +280,11 @@ static int link_write(pal_link *link, struct lws *wsi)
         link->queue_first = (link->queue_first + 1) % LINK_QUEUE;
         link->n_queued--;
         kind = LWS_WRITE_TEXT;
-    } else if (link->has_pose) {
-        n = sizeof link->pose;
-        from = link->pose;
-        link->has_pose = false;
+    } else if (pose >= 0) {
+        n = sizeof link->pose[pose];
+        from = link->pose[pose];
+        link->sent_pose = link->poses.number[pose];
+        pose = pal_signal_edges_next(&link->poses, link->sent_pose);
     } else if (link->has_ack) {
         n = sizeof link->ack;
         from = link->ack;
@@ -285,7 +294,7 @@ static int link_write(pal_link *link, struct lws *wsi)
     }
     memcpy(buffer + LWS_PRE, from, n);
     if (lws_write(wsi, buffer + LWS_PRE, n, kind) < 0) return -1;
-    if (link->n_queued > 0 || link->has_pose || link->has_ack) lws_callback_on_writable(wsi);
+    if (link->n_queued > 0 || pose >= 0 || link->has_ack) lws_callback_on_writable(wsi);
     return 0;
 }
 
@@ -382,7 +391,7 @@ static void link_established(pal_link *link, struct lws *wsi)
     link->pause_reading = false;
     link->read_ns = pal_clock_ns();
     /* what is not on the wire yet stays here, where something newer replaces it: after an outage the server gets the
-     * newest pose, not thousands */
+     * newest pose and the last edges of its grasp, not thousands */
     const int unsent = LINK_UNSENT;
     setsockopt(lws_get_socket_fd(wsi), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent, sizeof unsent);
     if (link->o.read_bytes_s > 0) {

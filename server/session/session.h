@@ -3,8 +3,11 @@
  * Pacing: steps are due at absolute times, one per step_s of the scene. When a step is too slow, simulated time slows
  * down: the next step is due at once, and missed steps are dropped, never queued. The frame reports the slowdown and
  * n_late, the number of steps that began a tenth of a step or more after their due time. Input does not accumulate:
- * the newest pose of a tool wins, and at most 64 commands are taken before a step. While paused, a command or a pose
- * publishes a frame, in which tools follow their holders. A tool without a pose for lease_s is released; its force
+ * the newest pose of a tool wins, and at most 64 commands are taken before a step. Only a pose at which a tool began or
+ * ceased to grasp, or left, waits for a step of its own: what it grasps is where its button was pressed, however slow
+ * the steps are, and a release between two steps is one. Of more than PAL_EDGES of them (signal_edges.h) the last
+ * remain; a turn while paused takes them as a step does; a lease that expires drops them. While paused, a command or a
+ * pose publishes a frame, in which tools follow their holders. A tool without a pose for lease_s is released; its force
  * ramps out over PAL_BLEND_S (server/sim/core/blend.h). While nothing moves (all bodies sleep, it is paused, or the
  * recording that it plays has ended) and nobody looks, holds a tool or gives a command, the thread rests for
  * PAL_REST_NS at a time; steps of that time are taken together, with one frame. Who comes ends such a rest at once.
@@ -156,8 +159,8 @@ typedef struct pal_session_outline {
 const pal_session_outline *pal_session_view_outline(const pal_session *session);
 bool pal_session_has_field(const pal_session *session, int body, pal_field field); /* can it be displayed? */
 
-/* Newest pose of a tool; the latest wins, never waits; NULL releases the tool. REFUSED: not finite, out of reach, no
- * such tool. One thread at a time per tool. [net] */
+/* Newest pose of a tool; the latest wins, but for edges of its grasp (above), never waits; NULL releases the tool.
+ * REFUSED: not finite, out of reach, no such tool. One thread at a time per tool. [net] */
 pal_err pal_session_request_pose(pal_session *session, int tool, const pal_pose *pose);
 /* Queues a command, taken between two steps. FULL: 64 are pending; REFUSED: unknown kind, body, material, field, tool
  * or brush, or an input while a recording plays. pal_session_last_diagnostic reports what only the world can refuse

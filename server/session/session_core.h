@@ -3,6 +3,7 @@
 #ifndef PAL_SESSION_SESSION_CORE_H
 #define PAL_SESSION_SESSION_CORE_H
 #include "server/base/command_queue.h"
+#include "server/base/signal_edges.h"
 #include "server/base/triple_buffer.h"
 #include "server/estimate/estimator_set.h"
 #include "server/session/input_log.h"
@@ -19,10 +20,19 @@ typedef struct requested_pose {
     bool present;
 } requested_pose;
 
+/* the newest pose of a tool, and those at which it began or ceased to grasp, or left */
+typedef struct requested_poses {
+    pal_signal_edges edges;
+    requested_pose pose[PAL_EDGE_SLOTS];
+} requested_poses;
+
 typedef struct session_tool {
     pal_triple_buffer triple_buffer;
-    requested_pose slot[3];
+    requested_poses slot[3];
+    requested_poses requested; /* the network thread's own */
     /* the simulation thread's own */
+    const requested_poses *offered; /* slot that it has */
+    uint64_t taken;                 /* number of the last pose that it took */
     pal_pose pose;
     uint64_t arrived_ns;
     bool present, brushes; /* brushes: a brush began since the last release */
@@ -115,6 +125,8 @@ bool pal_session_moves(const pal_session *session);
 /* [sim] Waits for the due time; a step at least one whole step late is due now, and the missed ones are dropped.
  * Returns how many steps are due, more than one after a rest; 0: the thread is to end */
 int pal_session_pace(pal_session *session, uint64_t *due);
+/* [sim] the pose that the next step takes; NULL: that of the last one */
+const requested_pose *pal_session_next_pose(const session_tool *tool);
 /* [any] There is something to look at: ends a rest, or keeps the next one from beginning. After what is to be seen,
  * which the next step then sees: [sim] clears `called` before it looks */
 void pal_session_call(pal_session *session);

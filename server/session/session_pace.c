@@ -24,7 +24,8 @@ static bool is_idle(const pal_session *s)
         idle = !s->play && !s->options.unpaced;
         for (int b = 0; b < pal_world_body_count(s->world) && idle; b++) idle = pal_world_body(s->world, b)->asleep;
     }
-    for (int t = 0; t < s->scene->n_tool && idle; t++) idle = !s->tool[t].present;
+    for (int t = 0; t < s->scene->n_tool && idle; t++)
+        idle = !s->tool[t].present && !pal_session_next_pose(&s->tool[t]);
     return idle;
 }
 

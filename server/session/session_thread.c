@@ -1,4 +1,4 @@
-/* The simulation thread: takes commands and the newest poses, steps the world, publishes a frame, and sleeps until the
+/* The simulation thread: takes commands and poses, steps the world, publishes a frame, and sleeps until the
  * next absolute time. It waits for no other thread: poses and frames use triple buffers, commands a queue. The only
  * lock guards the last diagnostic, the materials and the place in a recording, and a rest; an ordinary step does not
  * take it. While nothing moves and nobody looks, the thread rests for several steps, which it takes together
@@ -100,17 +100,37 @@ static bool is_lifted(const pal_session *s, session_tool *tool, const requested_
     return tool->jumped_ns && to->arrived_ns - tool->jumped_ns < PAL_LIFT_NS;
 }
 
-/* copies the newest pose of every tool to the world and releases tools whose lease has expired; true: one changed */
+const requested_pose *pal_session_next_pose(const session_tool *tool)
+{
+    const int slot = pal_signal_edges_next(&tool->offered->edges, tool->taken);
+    return slot < 0 ? NULL : &tool->offered->pose[slot];
+}
+
+/* The pose of a tool for this step: the next edge of its grasp, else the newest one. NULL: there is no new one. silent:
+ * its lease has expired, whatever edges were before */
+static const requested_pose *take_pose(const pal_session *s, session_tool *tool, uint64_t now, bool *silent)
+{
+    const requested_poses *newer = pal_triple_buffer_take(&tool->triple_buffer);
+    if (newer) tool->offered = newer;
+    const requested_pose *newest = &tool->offered->pose[PAL_EDGE_NEWEST], *next = pal_session_next_pose(tool);
+    const uint64_t heard_ns = next ? newest->arrived_ns : tool->arrived_ns;
+    *silent = now > heard_ns && now - heard_ns > s->lease_ns;
+    if (next && *silent) next = newest;
+    if (next) tool->taken = tool->offered->edges.number[next - tool->offered->pose];
+    return next;
+}
+
+/* gives every tool's pose to the world and releases tools whose lease has expired; true: one changed */
 static bool take_poses(pal_session *s, uint64_t now)
 {
     bool changed = false;
     for (int t = 0; t < s->scene->n_tool; t++) {
         session_tool *tool = &s->tool[t];
-        const requested_pose *slot = pal_triple_buffer_take(&tool->triple_buffer);
-        bool gone = tool->present && now > tool->arrived_ns && now - tool->arrived_ns > s->lease_ns;
+        bool silent;
+        const requested_pose *slot = take_pose(s, tool, now, &silent);
+        const bool gone = tool->present && silent;
         pal_input_record record = {.index = t, .step = s->step};
-        const bool fresh = slot && slot->present && (now < slot->arrived_ns || now - slot->arrived_ns <= s->lease_ns),
-                   lifted = fresh && is_lifted(s, tool, slot);
+        const bool fresh = slot && slot->present && !silent, lifted = fresh && is_lifted(s, tool, slot);
         if (!fresh && (slot || gone)) tool->seen_ns = 0;
         if (fresh && !lifted) {
             if (pal_world_pose(s->world, t, &slot->pose)) {
@@ -415,9 +435,11 @@ static pal_err prepare(pal_session *s, pal_diagnostic *diag)
     for (int k = 0; k < 3; k++) whole = (s->frame[k] = pal_frame_create(s->world)) && whole;
     if (!whole) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the session's frames");
     pal_triple_buffer_init(&s->frames, s->frame[0], s->frame[1], s->frame[2]);
-    for (int t = 0; t < PAL_TOOL_MAX; t++)
-        pal_triple_buffer_init(&s->tool[t].triple_buffer, &s->tool[t].slot[0], &s->tool[t].slot[1],
-                               &s->tool[t].slot[2]);
+    for (int t = 0; t < PAL_TOOL_MAX; t++) {
+        session_tool *tool = &s->tool[t];
+        pal_triple_buffer_init(&tool->triple_buffer, &tool->slot[0], &tool->slot[1], &tool->slot[2]);
+        tool->offered = &tool->slot[2];
+    }
     if (!s->options.record_path) return PAL_ERR_OK;
     const pal_scene *recorded = s->options.resume ? pal_resume_recorded_scene(s->options.resume) : s->scene;
     PAL_TRY(pal_input_log_open(s->options.record_path, recorded, ring_bytes(s), diag, &s->log));
@@ -577,15 +599,25 @@ static pal_err refuse(pal_session *s)
     return PAL_ERR_REFUSED;
 }
 
+static bool grasps(const requested_pose *pose)
+{
+    return pose->present && (pose->pose.buttons & PAL_POSE_GRASP);
+}
+
 pal_err pal_session_request_pose(pal_session *s, int tool, const pal_pose *pose)
 {
     if (s->play) return PAL_ERR_OK;
     if (tool < 0 || tool >= s->scene->n_tool || (pose && !pal_pose_ok(pose, s->reach_m))) return refuse(s);
-    requested_pose *slot = pal_triple_buffer_slot(&s->tool[tool].triple_buffer);
-    slot->present = pose != NULL;
-    if (pose) slot->pose = *pose;
-    slot->arrived_ns = session_now_ns(s);
-    pal_triple_buffer_publish(&s->tool[tool].triple_buffer);
+    session_tool *to = &s->tool[tool];
+    requested_pose *newest = &to->requested.pose[PAL_EDGE_NEWEST], next = {.arrived_ns = session_now_ns(s)};
+    next.present = pose != NULL;
+    if (pose) next.pose = *pose;
+    const bool leaves = newest->present && !next.present;
+    const int edge = pal_signal_edges_put(&to->requested.edges, leaves || grasps(&next) != grasps(newest));
+    *newest = next;
+    if (edge >= 0) to->requested.pose[edge] = next;
+    *(requested_poses *)pal_triple_buffer_slot(&to->triple_buffer) = to->requested;
+    pal_triple_buffer_publish(&to->triple_buffer);
     pal_session_call(s);
     return PAL_ERR_OK;
 }

@@ -15,13 +15,11 @@ static void transfer_tools(pal_session *to, pal_session *from, uint64_t now_ns)
     uint64_t away_ns = now_ns - to->transferred_ns;
     for (int t = 0; t < to->scene->n_tool && t < from->scene->n_tool; t++) {
         session_tool *a = &to->tool[t], *b = &from->tool[t];
-        const requested_pose *slot = pal_triple_buffer_take(&b->triple_buffer);
-        if (slot) {
-            requested_pose *kept = pal_triple_buffer_slot(&a->triple_buffer);
-            *kept = *slot;
-            kept->arrived_ns = later(slot->arrived_ns, away_ns, now_ns);
-            pal_triple_buffer_publish(&a->triple_buffer);
-        }
+        a->requested = b->requested, a->taken = b->taken;
+        for (int k = 0; k < PAL_EDGE_SLOTS; k++)
+            a->requested.pose[k].arrived_ns = later(b->requested.pose[k].arrived_ns, away_ns, now_ns);
+        *(requested_poses *)pal_triple_buffer_slot(&a->triple_buffer) = a->requested;
+        pal_triple_buffer_publish(&a->triple_buffer);
         b->arrived_ns = later(b->arrived_ns, away_ns, now_ns);
         a->pose = b->pose, a->arrived_ns = b->arrived_ns, a->present = b->present;
     }

@@ -390,11 +390,14 @@ static void what_was_lost_with_the_server_is_not_repeated(void)
 
 /* ---- states of tools ---- */
 
+static bool pressed; /* its button */
+
 static void state(uint32_t seq, uint64_t source)
 {
     uint8_t bytes[256];
     palpate_tool_state_t s;
-    pal_lcm_from_pose(&(pal_wire_pose){.seq = seq, .quaternion = {1}, .stamp_us = 1}, &s);
+    pal_lcm_from_pose(
+        &(pal_wire_pose){.seq = seq, .quaternion = {1}, .stamp_us = 1, .buttons = pressed ? PAL_WIRE_GRASP : 0}, &s);
     const int n = palpate_tool_state_t_encode(bytes, 0, sizeof bytes, &s);
     REQUIRE(n > 0);
     bus->message(watcher_user, "PALPATE1/main/TOOL/0", bytes, (size_t)n, source);
@@ -428,6 +431,21 @@ static void numbers_of_states_do_not_jump(void)
     now_ns += 1000000000;
     state(1 + 250 + PAL_STATES_AHEAD, 8);
     CHECK_INT(pose.seq, 1 + 250 + PAL_STATES_AHEAD);
+}
+
+/* a device that sends 1,000 states a second, of which 245 are passed on: among them each at which its button changes */
+static void a_change_of_the_grasp_is_passed_on_at_once(void)
+{
+    begin();
+    hello(false);
+    for (uint32_t seq = 1; seq <= 2000; seq++) {
+        pressed = seq % 100 >= 50;
+        state(seq, 7);
+        if (seq >= 50 && seq % 50 == 0) CHECK_INT(pose.seq, seq);
+        now_ns += 1000000;
+    }
+    pressed = false;
+    CHECK_LE(n_pose, 2 * 245 + 10);
 }
 
 /* as when palpate-lcm is started again, or the tool was given back after a silence */
@@ -475,6 +493,7 @@ int main(void)
     RUN(an_edit_names_its_asset_before_its_frames);
     RUN(what_was_lost_with_the_server_is_not_repeated);
     RUN(numbers_of_states_do_not_jump);
+    RUN(a_change_of_the_grasp_is_passed_on_at_once);
     RUN(a_sender_that_has_long_counted_is_taken);
     RUN(refusals_are_counted_and_logged_once_a_second);
     pal_lcm_bridge_close(bridge);

@@ -196,17 +196,23 @@ static inline int mem_pull(mem_client *c, int n)
     return taken;
 }
 
-static inline void mem_pose(mem_client *c, int tool, uint32_t seq, const double position_m[3])
+static inline void mem_pose_with(mem_client *c, int tool, uint32_t seq, const double position_m[3], uint32_t buttons)
 {
     uint8_t bytes[PAL_WIRE_POSE_BYTES];
     pal_wire_pose pose = {.tool = (uint16_t)tool,
                           .seq = seq,
                           .stamp_us = 1000 + seq,
                           .quaternion = {1, 0, 0, 0},
+                          .buttons = buttons,
                           .model_seq = c->model_seq};
     for (int i = 0; i < 3; i++) pose.position_m[i] = position_m[i];
     CHECK_INT(pal_wire_put_pose(bytes, sizeof bytes, &pose), PAL_WIRE_POSE_BYTES);
     pal_mem_send(c->peer, bytes, sizeof bytes, false);
+}
+
+static inline void mem_pose(mem_client *c, int tool, uint32_t seq, const double position_m[3])
+{
+    mem_pose_with(c, tool, seq, position_m, 0);
 }
 
 static inline void mem_end(mem_client *c)

@@ -329,6 +329,30 @@ static int tool_of(const mem_client *c)
     return -2;
 }
 
+/* Ada presses at 2, moves on to 3, and lets go at 4, all before the next step; Bob's poses are apart from hers */
+static void a_press_between_two_steps_has_a_step_of_its_own(void)
+{
+    mem_client a, b;
+    begin(false, 0);
+    mem_join(&a, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    mem_join(&b, transport, "Bob", PAL_WIRE_ROLE_TRAINEE, 1);
+    UNTIL(a.n_tools && b.n_tools, &a, &b);
+    for (uint32_t seq = 1; seq <= 5; seq++) {
+        const double at[3] = {0.01 * seq, 0, 0.3};
+        mem_pose_with(&a, 0, seq, at, seq == 2 || seq == 3 ? PAL_WIRE_GRASP : 0);
+        mem_pose(&b, 1, 10 + seq, at);
+    }
+    static const uint32_t wanted[] = {2, 4, 5};
+    for (int k = 0; k < 3; k++) {
+        served_turn(served_step_ns, &a, &b);
+        CHECK_INT(a.tools.tool[0].echo_seq, wanted[k]);
+        CHECK_NEAR((double)a.tools.tool[0].position_m[0], 0.01 * wanted[k], 1e-7);
+        CHECK_INT(a.tools.tool[1].echo_seq, 15);
+    }
+    mem_end(&a), mem_end(&b);
+    end();
+}
+
 /* half a second: Ada moves her tool, Bob's device lies still */
 static void lie_still(mem_client *a, mem_client *b, mem_client *c, int k)
 {
@@ -610,6 +634,7 @@ int main(void)
     RUN(numbers_grow_through_every_change_of_tier);
     RUN(a_tool_has_one_holder);
     RUN(an_unmoved_tool_goes_to_who_waits_for_one);
+    RUN(a_press_between_two_steps_has_a_step_of_its_own);
     RUN(pose_of_the_holder_moves_the_tool_and_is_echoed);
     RUN(force_of_a_device_is_compared_with_the_servers);
     RUN(viewer_moves_no_tool_and_gives_no_command);

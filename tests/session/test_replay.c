@@ -29,8 +29,9 @@ static size_t slurp(const char *name, uint8_t *bytes, size_t cap)
     return n;
 }
 
-/* 300 steps with presses, a grasp, a material edit, resets, a tool that falls silent, brushes: one of a tool that is
- * let go without ever having been there, one of the tool that falls silent, one that ends by itself */
+/* 300 steps with presses, grasps, some of which move on before the step that takes their beginning, a material edit,
+ * resets, a tool that falls silent, brushes: one of a tool that is let go without ever having been there, one of the
+ * tool that falls silent, one that ends by itself */
 static bool record(void)
 {
     const pal_brush blow = {.kind = PAL_BRUSH_INFLATE, .at_m = {0, 0, 0.05}, .radius_m = 0.03, .pressure_Pa = 400};
@@ -62,6 +63,8 @@ static bool record(void)
                          .seq = (uint32_t)step};
         if (step % 60 < 38)
             CHECK(!pal_session_request_pose(s, 0, &pose)); /* 22 steps of silence: longer than the lease */
+        pose.position_m[1] += 0.004;
+        if (step % 60 < 38 && step % 50 == 21) CHECK(!pal_session_request_pose(s, 0, &pose));
         if (step == 96) CHECK(!pal_session_request_pose(s, 1, NULL));
         for (size_t k = 0; k < sizeof order / sizeof *order; k++)
             if (order[k].step == step) CHECK(!pal_session_command(s, &order[k].command));
@@ -87,6 +90,23 @@ static void a_recorded_session_gives_the_same_hashes_again(void)
     CHECK_INT(report.n_hash_equal, report.n_hash);
     CHECK(report.first_difference == UINT64_MAX);
     CHECK(report.last_hash != 0);
+}
+
+/* the pose that the step took, and not the newest one before it */
+static void the_log_has_the_poses_that_steps_took(void)
+{
+    size_t at = 0;
+    int n = 0;
+    pal_input_header header;
+    pal_input_record record_;
+    REQUIRE(!pal_input_get_header("log", whole, n_whole, &header, &at, NULL));
+    while (!pal_input_get_record("log", whole, n_whole, &at, &record_, NULL) && record_.kind != PAL_INPUT_END) {
+        if (record_.kind != PAL_INPUT_POSE || record_.index != 0) continue;
+        CHECK_INT(record_.pose.seq, record_.step + 1);
+        CHECK_NEAR(record_.pose.position_m[1], 0, 0);
+        n++;
+    }
+    CHECK_INT(n, 5 * 38);
 }
 
 /* gives a record of n bytes the CRC that it should have */
@@ -383,6 +403,7 @@ int main(void)
     /* bodies with a skin have no brushes */
     pal_entry_init(&scene.body[0].output, "output", "surface_output");
     RUN(a_recorded_session_gives_the_same_hashes_again);
+    RUN(the_log_has_the_poses_that_steps_took);
     RUN_SERIAL(changed_poses_and_materials_are_found_at_the_next_hash);
     RUN(every_cut_is_told_with_its_byte_and_the_rest_is_replayed);
     RUN(a_damaged_record_ends_the_log);

@@ -285,6 +285,127 @@ static void the_newest_pose_wins_and_is_echoed_with_its_arrival_time(void)
     pal_session_close(s);
 }
 
+/* ---- edges of a grasp ---- */
+
+static const double AWAY = NAN;
+
+/* a pose at x, 0.05 outside the ball, arrives between two steps; AWAY: the tool leaves */
+static void arrive(pal_session *s, double x, bool grasps)
+{
+    pal_pose pose = pose_at(x, 0.1, 0);
+    pose.buttons = grasps ? PAL_POSE_GRASP : 0;
+    CHECK_INT(pal_session_request_pose(s, 0, isnan(x) ? NULL : &pose), 0);
+}
+
+/* where the tool is in the next step, and whether it grasps */
+static void check_step(pal_session *s, double x, bool grasps)
+{
+    const pal_frame_tool *tool = &stepped_steps(s, 1)->tool[0];
+    CHECK_INT(tool->present, !isnan(x));
+    if (isnan(x)) return;
+    CHECK_NEAR(tool->pose.position_m[0], x, 1e-12);
+    CHECK_INT((tool->pose.buttons & PAL_POSE_GRASP) != 0, grasps);
+}
+
+static void what_begins_or_ends_a_grasp_has_a_step_of_its_own(void)
+{
+    pal_session *s = open_with((pal_session_options){0});
+    REQUIRE(s != NULL);
+    /* pressed at 2 mm, and moved on before the step */
+    for (int k = 0; k < 5; k++) arrive(s, 0.001 * k, k >= 2);
+    check_step(s, 0.002, true);
+    check_step(s, 0.004, true);
+    /* let go, and pressed again elsewhere */
+    arrive(s, 0.005, false), arrive(s, 0.006, false), arrive(s, 0.007, true), arrive(s, 0.008, true);
+    check_step(s, 0.005, false);
+    check_step(s, 0.007, true);
+    check_step(s, 0.008, true);
+    /* one step takes the first, more come, and the rest is not lost */
+    arrive(s, 0.009, false), arrive(s, 0.010, true);
+    check_step(s, 0.009, false);
+    arrive(s, 0.011, true), arrive(s, 0.012, false);
+    check_step(s, 0.010, true);
+    check_step(s, 0.012, false);
+    /* it leaves, comes back and grasps: that is another grasp */
+    arrive(s, 0.013, true);
+    check_step(s, 0.013, true);
+    arrive(s, AWAY, false), arrive(s, 0.014, false), arrive(s, 0.015, true), arrive(s, 0.016, true);
+    check_step(s, AWAY, false);
+    check_step(s, 0.015, true);
+    check_step(s, 0.016, true);
+    /* of seven edges the last four, and the end is the newest pose */
+    for (int k = 0; k < 7; k++) arrive(s, 0.017 + 0.001 * k, k % 2), arrive(s, 0.03, k % 2);
+    for (int k = 3; k < 7; k++) check_step(s, 0.017 + 0.001 * k, k % 2);
+    check_step(s, 0.03, false);
+    pal_session_close(s);
+}
+
+/* who takes a tool that another let go begins anew, and the other tool sees nothing of it */
+static void another_holder_does_not_keep_a_grasp(void)
+{
+    pal_session *s = open_with((pal_session_options){0});
+    REQUIRE(s != NULL);
+    arrive(s, 0.001, true);
+    check_step(s, 0.001, true);
+    pal_pose other = pose_at(0.2, 0, 9);
+    CHECK_INT(pal_session_request_pose(s, 1, &other), 0);
+    arrive(s, AWAY, false), arrive(s, 0.04, true);
+    check_step(s, AWAY, false);
+    CHECK_INT(stepped_newest(s)->tool[1].pose.seq, 9);
+    check_step(s, 0.04, true);
+    pal_session_close(s);
+}
+
+/* steps that take longer than the lease: who still sends is there, with all that came; who does not is not */
+static void an_edge_older_than_the_lease_counts_while_poses_come(void)
+{
+    pal_session *s = open_with((pal_session_options){.lease_s = 0.4 * scene.step_s});
+    REQUIRE(s != NULL);
+    arrive(s, 0.001, true);
+    manual_clock_advance(&stepped_clock, STEP_NS - STEP_NS / 5);
+    arrive(s, 0.002, true);
+    manual_clock_advance(&stepped_clock, STEP_NS / 5);
+    manual_clock_settle(&stepped_clock, 1);
+    CHECK_NEAR(stepped_newest(s)->tool[0].pose.position_m[0], 0.001, 1e-12);
+    CHECK(stepped_newest(s)->tool[0].present);
+    check_step(s, AWAY, false);
+    arrive(s, 0.003, false), arrive(s, 0.004, true);
+    check_step(s, AWAY, false);
+    pal_session_close(s);
+}
+
+/* shown where they are held (below), so that after a pause a grasp begins where the hand is */
+static void a_pause_keeps_no_edge(void)
+{
+    pal_session *s = open_with((pal_session_options){.start_paused = true});
+    REQUIRE(s != NULL);
+    arrive(s, 0.001, true), arrive(s, 0.002, true);
+    check_step(s, 0.001, true);
+    check_step(s, 0.002, true);
+    arrive(s, 0.003, true);
+    CHECK_INT(stepped_order(s, PAL_COMMAND_RESUME), 0);
+    check_step(s, 0.003, true);
+    CHECK_INT(stepped_newest(s)->tick, 1);
+    pal_session_close(s);
+}
+
+/* the tool was at the ball's top when the button was pressed, and 30 mm above it by the next step */
+static void a_press_holds_the_tissue_where_it_was_pressed(void)
+{
+    pal_session *s = open_with((pal_session_options){0});
+    REQUIRE(s != NULL);
+    for (int k = 0; k < 3; k++) {
+        pal_pose pose = pose_at(0, 0.05 + (k > 1 ? 0.03 : 0), (uint32_t)k + 1);
+        pose.buttons = k > 0 ? PAL_POSE_GRASP : 0;
+        CHECK_INT(pal_session_request_pose(s, 0, &pose), 0);
+    }
+    CHECK(stepped_steps(s, 1)->tool[0].holding);
+    CHECK_NEAR(stepped_newest(s)->tool[0].pose.position_m[2], 0.05, 1e-12);
+    CHECK(stepped_steps(s, 1)->tool[0].holding);
+    CHECK_NEAR(stepped_newest(s)->tool[0].pose.position_m[2], 0.08, 1e-12);
+    pal_session_close(s);
+}
+
 /* 0.25 s are 50 steps: the pose is as old as the lease at the 50th and older at the next one */
 static void a_silent_holder_loses_the_tool_after_its_lease(void)
 {
@@ -506,6 +627,23 @@ static void another_session_goes_on_where_one_was(void)
     pal_session_close(next);
 }
 
+/* poses that no step has taken yet are those of the next session */
+static void so_do_the_edges_of_a_grasp(void)
+{
+    uint64_t hash = 0;
+    pal_session *before = open_with((pal_session_options){0}), *next = NULL;
+    REQUIRE(before && !pal_session_open_after(before, &scene, NULL, &next));
+    arrive(before, 0.001, true), arrive(before, 0.002, false), arrive(before, 0.003, true), arrive(before, 0.004, true);
+    check_step(before, 0.001, true);
+    REQUIRE(stepped_transfer(next, before, transfer_all, &hash));
+    arrive(next, 0.005, true);
+    check_step(next, 0.002, false);
+    check_step(next, 0.003, true);
+    check_step(next, 0.005, true);
+    pal_session_close(before);
+    pal_session_close(next);
+}
+
 static void a_scene_that_cannot_run_opens_no_session(void)
 {
     pal_scene bad = scene;
@@ -707,6 +845,11 @@ int main(void)
     RUN(a_session_that_starts_paused_shows_rest_and_steps_one_by_one);
     RUN(reset_brings_the_rest_shape_back);
     RUN(the_newest_pose_wins_and_is_echoed_with_its_arrival_time);
+    RUN(what_begins_or_ends_a_grasp_has_a_step_of_its_own);
+    RUN(another_holder_does_not_keep_a_grasp);
+    RUN(an_edge_older_than_the_lease_counts_while_poses_come);
+    RUN(a_pause_keeps_no_edge);
+    RUN(a_press_holds_the_tissue_where_it_was_pressed);
     RUN(a_silent_holder_loses_the_tool_after_its_lease);
     RUN(while_paused_tools_are_shown_where_they_are_held);
     RUN(bad_poses_and_commands_are_refused_and_counted);
@@ -716,6 +859,7 @@ int main(void)
     RUN(no_heap_call_after_open);
     RUN(survives_poses_commands_and_frames_from_many_threads);
     RUN(another_session_goes_on_where_one_was);
+    RUN(so_do_the_edges_of_a_grasp);
     RUN(a_scene_that_cannot_run_opens_no_session);
     RUN(components_and_parts_are_known_to_every_thread);
     RUN(a_brush_lasts_until_its_tool_is_let_go);

@@ -44,8 +44,8 @@ export class PoseSender {
     }
 
     /**
-     * Position to send: the target, but a grasp stays where it began until the server holds the tissue there. Only the
-     * newest pose counts, so a fast drag would otherwise close the tool beside the organ.
+     * Position to send: the target, but a grasp stays where it began until the server holds the tissue there, so that
+     * the tissue follows a fast drag from its first step on.
      * @param {{position: number[], grasp: boolean}} target @param {number} now ms
      */
     position(target, now) {
