@@ -326,8 +326,7 @@ static void check_points(const pal_study *s)
     CHECK(s->max_m > 0.009 && s->max_m < 0.012 && s->step_s > 0 && s->machine[0]);
 }
 
-/* Each from the others. Costs: the larger of two sizes is told 0.66 of its points' work by five steps of the smaller
- * one; a factor of 2 is wrong */
+/* each point by the others: costs are 0.66 to 0.93 of the work that is counted, of so few points */
 static void check_predicted(const pal_study *s)
 {
     int n = 0, n_cost = 0;
