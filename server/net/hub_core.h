@@ -182,7 +182,7 @@ typedef struct pal_hub_room {
     pal_hub_undo undo[PAL_UNDO_ORDERS]; /* the oldest first [n_undo] */
     int n_undo;
     pal_hub_quality quality;
-    uint64_t slow_ns;   /* since when steps take much more than their time; 0: they do not */
+    uint64_t slow_ns;   /* since when the session is much slower than real time by its own steps; 0: it is not */
     uint64_t undone_ns; /* when an order was last taken back */
     /* steps without output for lack of observers; tick and OUTPUT runs at the last count */
     uint64_t n_unobserved, seen_tick, seen_output;

@@ -119,9 +119,9 @@ void pal_hub_watch_pace(pal_hub_room *room)
         room->slow_ns = room->quality.slow_ns = room->quality.spare_ns = 0;
         return;
     }
-    /* One order after the other, each with the time to show that it was the one. By processor time: what others make of
-     * a machine slows the session too, and no order is to blame for it */
-    const uint64_t slow_ns = held_for(f->load > PAL_SLOW_MAX, &room->slow_ns, now);
+    /* One order after the other, each with the time to show that it was the one. By processor time as well: what else
+     * runs on a machine slows the session too, and no order is to blame for it */
+    const uint64_t slow_ns = held_for(fmin(f->slowdown, f->load) > PAL_SLOW_MAX, &room->slow_ns, now);
     const uint64_t since_ns = room->slow_ns > PAL_BLAME_NS ? room->slow_ns - PAL_BLAME_NS : 0;
     if (slow_ns > PAL_SLOW_NS && now > room->undone_ns + PAL_SLOW_NS && !pal_hub_jobs_own(room) &&
         take_back(room, since_ns, room->slow_ns + PAL_BLAME_NS, f->load))

@@ -1,7 +1,7 @@
-/* Watches the pace of sessions. An order after which the steps of a session take more than PAL_SLOW_MAX of their
- * time, by the processor's clock, is taken back. A scene with the key keep_real_time gives up accuracy before it gives
- * up time: the next cheaper configuration of its study, or a coarser one, and back when there is time to spare. Members
- * are told. Thread: [net].
+/* Watches the pace of sessions. An order after which a session stays slower than real time by more than PAL_SLOW_MAX
+ * is taken back, where its steps take as much of the processor. A scene with the key keep_real_time gives up accuracy
+ * before it gives up time: the next cheaper configuration of its study, or a coarser one, and back when there is time
+ * to spare. Members are told. Thread: [net].
  */
 #ifndef PAL_NET_HUB_WATCH_H
 #define PAL_NET_HUB_WATCH_H

@@ -78,9 +78,9 @@
 /* a scene that does not fit into its time may become this much dearer by trainees' commands in all: predictions are to
  * a fifth (test_cost_hub) */
 #define PAL_DEARER 1.25
-/* processor time of the steps over simulated time above which, for so many ns, the last order is taken back, and after
- * as many more the one before; ns within which it must have been given. The same slowdown is told by /readyz. Repeated
- * orders within PAL_SLOW_NS are one (test_cost_hub) */
+/* slowdown, and processor time of the steps over simulated time, above which, for so many ns, the last order is taken
+ * back, and after as many more the one before; ns within which it must have been given. Repeated orders within
+ * PAL_SLOW_NS are one (test_cost_hub) */
 #define PAL_SLOW_MAX 2.0
 #define PAL_SLOW_NS  3000000000u
 #define PAL_BLAME_NS 10000000000u
