@@ -419,8 +419,8 @@ void pal_contact_points_assemble_bound(const pal_contact_points *points, const p
     }
 }
 
-double pal_contact_points_max_eigenvalue(pal_contact_points *points, const pal_body *body, const pal_contact *contact,
-                                         int n)
+double pal_contact_points_max_eigenvalue(pal_contact_points *points, const pal_body *body, const double *diagonal,
+                                         const pal_contact *contact, int n)
 {
     /* a patch of very many points is judged by a part of them, each standing for several */
     int stride = (n + EIGENVALUE_POINTS - 1) / EIGENVALUE_POINTS, m = 0;
@@ -437,8 +437,9 @@ double pal_contact_points_max_eigenvalue(pal_contact_points *points, const pal_b
         }
         pal_contact_points_from_slots(points, body, points->force);
         for (int i = 0; i < points->n_node; i++) {
-            double *at = points->force + 3 * (size_t)points->node[i];
-            pal_scale3(at, body->support[points->node[i]] ? 0 : 1 / body->mass_kg[points->node[i]], at);
+            const int node = points->node[i];
+            double *at = points->force + 3 * (size_t)node;
+            pal_scale3(at, body->support[node] || !(diagonal[node] > 0) ? 0 : 1 / diagonal[node], at);
         }
         pal_contact_points_to_slots(points, body, points->force);
         /* the points' motion then: a Rayleigh quotient in the norm of k */

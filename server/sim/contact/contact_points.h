@@ -67,10 +67,11 @@ void pal_contact_points_at(const pal_contact_points *points, int point, const do
 bool pal_contact_points_nearest(const pal_contact_points *points, const pal_body *body, const double p[3], double at[3],
                                 double normal[3]);
 
-/* Explicit stability: the largest eigenvalue of M^-1 sum k J' J over the contacts, J being a point's motion along
- * `away` with the free nodes, 1/s^2; two power iterations from a uniform push, which is close to its eigenvector */
-double pal_contact_points_max_eigenvalue(pal_contact_points *points, const pal_body *body, const pal_contact *contact,
-                                         int n);
+/* The largest eigenvalue of D^-1 sum k J' J over the contacts, J being a point's motion along `away` with the free
+ * nodes and D a diagonal matrix, 0 where it takes no part: of the body's masses, kg, for explicit stability in 1/s^2,
+ * or of row sums, N/m [n_node]. Two power iterations from a uniform push, which is close to its eigenvector */
+double pal_contact_points_max_eigenvalue(pal_contact_points *points, const pal_body *body, const double *diagonal,
+                                         const pal_contact *contact, int n);
 /* Row sums of that matrix without M, |J_i| k sum |J_j| over the nodes j, which bound it from above: begin_slots, add
  * every contact's with its stiffness, then to bound [n_node] */
 void pal_contact_points_add_bound(pal_contact_points *points, const pal_body *body, const pal_contact *contact,

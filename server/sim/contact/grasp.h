@@ -44,6 +44,7 @@ typedef struct pal_grasp {
     double reach_m;               /* when it closed                                       */
     double offset[3];             /* o, in the tool's axes at quaternion 1                */
     double force[3];              /* on the tool, this sub-step                           */
+    double row_sum_N_m;           /* over weights, of what the solver takes implicitly; 0: nothing */
     double torque_Nm[3];          /* counted in the tool's                                */
     pal_adaptive_grasp *adaptive; /* adaptive bodies only, else NULL                      */
     pal_stiffness_fit fit;        /* rendered stiffness                                   */
@@ -54,8 +55,9 @@ typedef struct pal_grasp {
 
 typedef struct pal_grasps pal_grasps;
 struct pal_grasps {
-    /* the regime: force of one grasp in this sub-step */
+    /* the regime: force of one grasp in this sub-step; pal_tangent.settle */
     void (*act)(const pal_grasps *grasps, pal_grasp *g, pal_tool *tool, pal_step *step);
+    bool (*settle)(pal_grasps *grasps, pal_step *step, const double *moved, bool last);
     int n_tool;
     pal_grasp *grasp;                           /* [n_tool] */
     double *sum_weight;                         /* of all tools that hold a node [n_node] */
@@ -67,11 +69,12 @@ struct pal_grasps {
 };
 
 void pal_grasp_act_explicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *tool, pal_step *step);
+bool pal_grasp_settle_explicit(pal_grasps *grasps, pal_step *step, const double *moved, bool last);
 void pal_grasp_act_implicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *tool, pal_step *step);
 /* pal_tangent of the implicit regime */
 void pal_grasp_multiply(void *self, const pal_body *body, double k, const double *p, double *out);
 int pal_grasp_mean_springs(const void *self, pal_mean_spring *out, int max);
-bool pal_grasp_settle(void *self, pal_step *step, const double *moved, bool last);
+bool pal_grasp_settle_implicit(pal_grasps *grasps, pal_step *step, const double *moved, bool last);
 
 /* ---- for the regimes ---- */
 

@@ -104,9 +104,8 @@ static bool settle_tool(pal_grasp *g, pal_tool *tool, pal_body *body, const doub
     return capped;
 }
 
-bool pal_grasp_settle(void *self, pal_step *step, const double *moved, bool last)
+bool pal_grasp_settle_implicit(pal_grasps *grasps, pal_step *step, const double *moved, bool last)
 {
-    pal_grasps *grasps = self;
     pal_tools *tools = step->tools;
     int n_tool = tools->n_tool < grasps->n_tool ? tools->n_tool : grasps->n_tool;
     bool again = false;

@@ -18,12 +18,15 @@ typedef struct pal_push_regime {
     void (*hold_back)(pal_tool_contact *t, double here_m[3]);
     /* forces of all tools in this sub-step, their contacts found */
     void (*act)(pal_push *push, int n_tool, pal_step *step);
+    /* pal_tangent.settle; NULL: the forces are those of act */
+    bool (*settle)(pal_push *push, pal_step *step, const double *moved, bool last);
 
     /* explicit regimes: largest contact stiffness over mass times dt^2, damping time over dt, a bound of the
      * eigenvalues of M^-1 K of contact, 1/s^2; after other triangles were drawn the force does not rise */
     double stiffness_limit, damping_steps;
     double pressure; /* pal_push_pressure_of_radius: stiffness per area in E over radius */
-    double (*eigenvalue_1_s2)(pal_contact_points *points, const pal_body *body, const pal_contact *contact, int n);
+    double (*eigenvalue_1_s2)(pal_contact_points *points, const pal_body *body, const double *mass_kg,
+                              const pal_contact *contact, int n);
     bool limits_rise;
 } pal_push_regime;
 
@@ -38,6 +41,7 @@ struct pal_push {
     pal_material material;        /* the body's, Poisson's ratio at most PAL_POISSON_CLAMP                */
     float *point_Pa;              /* pal_contact_points_young                                             */
     pal_contact_springs *springs; /* implicit only                                                        */
+    double *row_sum_N_m;          /* explicit only, 0 between uses [body n_node]                          */
     int n_stiffness, n_step;      /* stiffnesses found in this step; steps, to give each tool its turn    */
 };
 
@@ -58,10 +62,12 @@ void pal_push_follow_side(pal_tool_contact *t, const double side_before[3], doub
 void pal_push_want(pal_push *push, const pal_body *body, double *bound_N_m);
 /* explicit: memory beside */
 pal_err pal_push_make_explicit(pal_push *push, pal_build *build);
-/* implicit: memory beside; pal_tangent.settle, self a pal_push */
+/* implicit: memory beside */
 pal_err pal_push_make_implicit(pal_push *push, pal_build *build);
-bool pal_push_settle(void *self, pal_step *step, const double *moved, bool last);
 
+/* torque of the contacts' forces, in the last sub-step: they act on the tool's surface, at (radius - depth) away; a
+ * force toward the centre has none, friction has */
+void pal_push_add_torque(pal_tool_contact *t, pal_tool *tool);
 /* the patches of a tool for a haptic bridge, in the last sub-step */
 void pal_push_publish(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step *step);
 #endif

@@ -3,20 +3,30 @@
  * A contact at depth d is pushed away from the proxy's centre with f = k (d - gamma dt v_away), v_away the tissue's own
  * speed. With a and b the ratios of stiffness and damping to m / dt^2 and m / dt:
  *
- * explicit: gamma = 1/2. verlet takes the stiffness implicitly by its row sums (body->load_stiffness), so that neither
- *     the sub-step nor the stiffness is bounded (verlet.c). Another solver has a common factor on k, which keeps the
- *     largest eigenvalue of contact stiffness over mass below alpha / dt^2.
+ * explicit: gamma = 1/2. verlet takes the stiffness K implicitly by a diagonal D (body->load_stiffness), so that
+ *     neither the sub-step nor the stiffness is bounded (verlet.c). Another solver has a common factor on k, which
+ *     keeps the largest eigenvalue of contact stiffness over mass below alpha / dt^2.
  * held load (rk4 of adaptive bodies): loads lag by dt/2. With gamma = 1, the nodes' own velocity and alpha = 0.5, b = a
  *     exceeds a/2, which makes up for the lag, and a + b <= 1: tissue is stopped and not thrown back. Where other
  *     triangles are drawn, as a finer surface bulges, the ramp of the contact falls so far that the force does not rise
  *     at that moment, and rises again.
  * interpolated (central_cg): contact is as stiff as with implicit solvers, and the solver is told before its sub-steps
  *     begin what stiffness the points near a tool will need. Beyond that alpha is 0.5; the eigenvalue is bounded by the
- *     sum of the points' own. */
+ *     sum of the points' own.
+ *
+ * D is a share of Gershgorin's row sums of K, the largest eigenvalue of K over them (two power iterations, at the first
+ * touch and once a step). Skinned points need a tenth, as forces of turning frames cancel. Nodes are heavier by dt^2 D,
+ * which delays them: with whole row sums a press is 4 times as far off and a strike is felt a third too hard.
+ *
+ * In a sub-step with D a node receives f - dt D dv: f at its begin, dv its change of velocity. Once dv is known, the
+ * tool is told the opposite of the sum of that, within its cap; tissue that comes toward a tool at its cap receives up
+ * to a tenth more. */
 #include "server/base/vec3.h"
 #include "server/sim/contact/push.h"
 #include "server/sim/contact/tuning.h"
 #include "server/sim/core/blend.h"
+
+#include <string.h>
 
 /* Coulomb friction: the tool's displacement across the tissue stretches a spring as stiff as the contact, which slips
  * at friction times the normal force; shared out like the normal force */
@@ -50,8 +60,9 @@ static void find_share(pal_push *push, pal_tool_contact *t, int n_tool, pal_step
         if (other != t && other->n_contact > 0)
             n_share += pal_contact_points_overlap(&push->points, step->body, t->contact, t->n_contact, other->contact,
                                                   other->n_contact);
-    double rate = EIGENVALUE_SAFETY * n_share *
-                  push->regime->eigenvalue_1_s2(&push->points, step->body, t->contact, t->n_contact);
+    double rate =
+        EIGENVALUE_SAFETY * n_share *
+        push->regime->eigenvalue_1_s2(&push->points, step->body, step->body->mass_kg, t->contact, t->n_contact);
     double max_rate =
         fmax(push->regime->stiffness_limit / (step->dt_s * step->dt_s), EIGENVALUE_SAFETY * n_share * t->wanted_1_s2);
     double share = rate > max_rate ? max_rate / rate : 1;
@@ -78,13 +89,29 @@ static double limit_rise(pal_tool_contact *t, double sum[3])
 }
 
 /* row sums of the stiffness of a tool's contacts, scaled, for a solver that takes them implicitly */
-static void add_stiffness(pal_push *push, const pal_tool_contact *t, double scale, pal_body *body)
+static void add_stiffness(pal_push *push, pal_tool_contact *t, double scale, const pal_step *step)
 {
+    pal_body *body = step->body;
+    pal_contact_points *points = &push->points;
+    pal_contact_row_sums *rows = &t->rows;
+    double *sum = push->row_sum_N_m;
     if (!body->load_stiffness) return;
-    pal_contact_points_begin_slots(&push->points);
+    pal_contact_points_begin_slots(points);
     for (int i = 0; i < t->n_contact; i++)
-        pal_contact_points_add_bound(&push->points, body, &t->contact[i], scale * t->contact[i].k_N_m);
-    pal_contact_points_assemble_bound(&push->points, body, body->load_stiffness);
+        pal_contact_points_add_bound(points, body, &t->contact[i], scale * t->contact[i].k_N_m);
+    pal_contact_points_assemble_bound(points, body, sum);
+    rows->n_node = points->n_node;
+    memcpy(rows->node, points->node, sizeof *rows->node * (size_t)rows->n_node);
+    if (step->sub == 0 || rows->share == 0) {
+        const double largest = pal_contact_points_max_eigenvalue(points, body, sum, t->contact, t->n_contact);
+        rows->share = fmin(1, EIGENVALUE_SAFETY * scale * largest);
+    }
+    for (int i = 0; i < rows->n_node; i++) {
+        const int node = rows->node[i];
+        rows->sum_N_m[i] = rows->share * sum[node];
+        body->load_stiffness[node] += rows->sum_N_m[i];
+        sum[node] = 0;
+    }
 }
 
 /* forces of one tool to the nodes and back */
@@ -93,9 +120,10 @@ static void press(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step 
     pal_body *body = step->body;
     double scale = tool->ramp * t->ramp * t->share * (1 - t->hold.share), sum[3] = {0}, stiffness = 0;
     double damping_s = step->dt_s * push->regime->damping_steps;
+    t->rows.n_node = 0;
     if (t->n_contact == 0 || scale <= 0) {
         pal_set3(t->slip, 0, 0, 0);
-        t->uncapped_N = 0;
+        t->uncapped_N = t->rows.share = 0;
         return;
     }
     for (int i = 0; i < t->n_contact; i++) {
@@ -110,7 +138,6 @@ static void press(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step 
     if (push->regime->limits_rise) stiffness *= limit_rise(t, sum);
     if (!pal_finite3(sum) || pal_dot3(sum, sum) == 0) return;
     add_friction(push, t, tool, sum, stiffness, step->dt_s);
-    add_stiffness(push, t, scale, body);
     pal_set3(sum, 0, 0, 0);
     pal_contact_points_begin_slots(&push->points);
     for (int i = 0; i < t->n_contact; i++) {
@@ -122,6 +149,7 @@ static void press(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step 
         const size_t at = 3 * (size_t)push->points.node[i];
         pal_axpy3(body->load + at, share, push->points.force + at);
     }
+    add_stiffness(push, t, share * scale, step);
     pal_scale3(t->total, share, sum);
     for (int i = 0; i < t->n_contact; i++) scale_contact(&t->contact[i], share);
     pal_add3(tool->force_N, tool->force_N, t->total);
@@ -136,6 +164,16 @@ pal_err pal_push_make_explicit(pal_push *push, pal_build *build)
     if (!push->springs) return PAL_ERR_MEMORY;
     PAL_TRY(
         pal_contact_springs_make(&push->points, build->body, PAL_CONTACT_IMPLICIT_MAX, build->arena, push->springs));
+    const size_t n_node = build->body->interpolation ? 0 : (size_t)build->body->n_node;
+    push->row_sum_N_m = PAL_NEW(build->arena, double, n_node);
+    bool all = push->row_sum_N_m != NULL;
+    for (int i = 0; i < push->n_tool; i++) {
+        pal_contact_row_sums *rows = &push->tool[i].rows;
+        rows->node = PAL_NEW(build->arena, int32_t, n_node);
+        rows->sum_N_m = PAL_NEW(build->arena, double, n_node);
+        all = all && rows->node && rows->sum_N_m;
+    }
+    if (!all) return PAL_ERR_MEMORY;
     size_t scratch = pal_haptic_stiffness_scratch(build->body) + PAL_CONTACT_IMPLICIT_MAX * sizeof(pal_contact) +
                      (size_t)push->points.sample.max_point * 4 * sizeof(double) + CONTACT_MAX + 256;
     if (build->scratch_byte < scratch) build->scratch_byte = scratch;
@@ -143,12 +181,9 @@ pal_err pal_push_make_explicit(pal_push *push, pal_build *build)
     return PAL_ERR_OK;
 }
 
-static void act(pal_push *push, int n_tool, pal_step *step)
+/* each tool in turn is the first to have its patches' stiffness found */
+static void publish(pal_push *push, int n_tool, pal_step *step)
 {
-    for (int t = 0; t < n_tool; t++) find_share(push, &push->tool[t], n_tool, step);
-    for (int t = 0; t < n_tool; t++) press(push, &push->tool[t], &step->tools->tool[t], step);
-    if (step->sub != step->n_sub - 1) return;
-    /* each tool in turn is the first to have its patches' stiffness found */
     push->n_step++, push->n_stiffness = 0;
     if (step->body->compliance) step->body->compliance->begin(step->body->compliance->self, step);
     for (int k = 0; k < n_tool; k++) {
@@ -157,9 +192,68 @@ static void act(pal_push *push, int n_tool, pal_step *step)
     }
 }
 
+static void act(pal_push *push, int n_tool, pal_step *step)
+{
+    for (int t = 0; t < n_tool; t++) find_share(push, &push->tool[t], n_tool, step);
+    for (int t = 0; t < n_tool; t++) {
+        press(push, &push->tool[t], &step->tools->tool[t], step);
+        if (step->sub == step->n_sub - 1) pal_push_add_torque(&push->tool[t], &step->tools->tool[t]);
+    }
+    if (step->sub == step->n_sub - 1 && !step->body->load_stiffness) publish(push, n_tool, step);
+}
+
+/* what the nodes received less than the contacts' forces, by row sums times `moved`: less on the tool, by as much as
+ * its cap allows, and on its contacts in proportion to their forces */
+static void settle_tool(pal_tool_contact *t, pal_tool *tool, pal_step *step, const double *moved)
+{
+    const pal_contact_row_sums *rows = &t->rows;
+    pal_body *body = step->body;
+    double less[3] = {0}, torque[3] = {0}, here[3], sum = 0;
+    pal_sub3(here, tool->here_m, body->offset_m);
+    for (int i = 0; i < rows->n_node; i++) {
+        const size_t at = 3 * (size_t)rows->node[i];
+        double f[3], arm[3], m[3];
+        pal_scale3(f, rows->sum_N_m[i], moved + at);
+        pal_sub3(body->load + at, body->load + at, f);
+        /* from where the node was when the force was found */
+        pal_sub3(arm, body->d + at, here);
+        pal_axpy3(arm, -step->dt_s, body->dv + at);
+        pal_cross3(m, arm, f);
+        pal_add3(less, less, f);
+        pal_add3(torque, torque, m);
+    }
+    if (rows->n_node == 0 || !pal_finite3(less) || !pal_finite3(torque)) return;
+    const double share = pal_tool_force_share(body, tool, less, 0);
+    pal_axpy3(tool->force_N, share, less);
+    pal_axpy3(t->total, share, less);
+    if (step->sub == step->n_sub - 1) {
+        pal_axpy3(tool->torque_Nm, share, torque);
+        pal_axpy3(t->torque_Nm, share, torque);
+    }
+    for (int i = 0; i < t->n_contact; i++) sum += t->contact[i].normal_N;
+    for (int i = 0; i < t->n_contact && sum > 0; i++) {
+        pal_contact *c = &t->contact[i];
+        const double part = share * c->normal_N / sum;
+        pal_axpy3(c->force, -part, less);
+        c->normal_N = fmax(0, c->normal_N - part * pal_dot3(less, c->away));
+    }
+}
+
+/* Forces at the end of the sub-step, of a solver that takes the stiffness implicitly: the momentum that nodes received
+ * over its length, and so exactly what the tool receives */
+static bool settle(pal_push *push, pal_step *step, const double *moved, bool last)
+{
+    pal_tools *tools = step->tools;
+    const int n_tool = tools->n_tool < push->n_tool ? tools->n_tool : push->n_tool;
+    for (int t = 0; t < n_tool && last; t++) settle_tool(&push->tool[t], &tools->tool[t], step, moved);
+    if (last && step->sub == step->n_sub - 1) publish(push, n_tool, step);
+    return false;
+}
+
 const pal_push_regime pal_push_explicit = {.pressure_Pa_m = pal_push_pressure_of_radius,
                                            .pressure = EXPLICIT_PRESSURE,
                                            .act = act,
+                                           .settle = settle,
                                            .stiffness_limit = EXPLICIT_ALPHA,
                                            .damping_steps = 0.5,
                                            .eigenvalue_1_s2 = pal_contact_points_max_eigenvalue};
@@ -167,6 +261,7 @@ const pal_push_regime pal_push_explicit = {.pressure_Pa_m = pal_push_pressure_of
 const pal_push_regime pal_push_held_load = {.pressure_Pa_m = pal_push_pressure_of_radius,
                                             .pressure = HELD_PRESSURE,
                                             .act = act,
+                                            .settle = settle,
                                             .stiffness_limit = 0.5,
                                             .damping_steps = 1,
                                             .eigenvalue_1_s2 = pal_contact_points_max_eigenvalue,
@@ -193,9 +288,11 @@ void pal_push_want(pal_push *push, const pal_body *body, double *bound_N_m)
 }
 
 /* the sum of the eigenvalues is no less than the largest, and a point between nodes moves no more than their mean */
-static double eigenvalue_1_s2(pal_contact_points *points, const pal_body *body, const pal_contact *contact, int n)
+static double eigenvalue_1_s2(pal_contact_points *points, const pal_body *body, const double *mass_kg,
+                              const pal_contact *contact, int n)
 {
     double sum = 0;
+    (void)mass_kg;
     for (int i = 0; i < n; i++) sum += pal_contact_points_bound(points, body, contact[i].point, contact[i].k_N_m, NULL);
     return sum;
 }

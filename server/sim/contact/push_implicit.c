@@ -77,9 +77,8 @@ static void act(pal_push *push, int n_tool, pal_step *step)
     for (int t = 0; t < n_tool; t++) begin(push, &push->tool[t], &step->tools->tool[t], step);
 }
 
-bool pal_push_settle(void *self, pal_step *step, const double *moved, bool last)
+static bool settle(pal_push *push, pal_step *step, const double *moved, bool last)
 {
-    pal_push *push = self;
     pal_tools *tools = step->tools;
     int n_tool = tools->n_tool < push->n_tool ? tools->n_tool : push->n_tool;
     bool again = false;
@@ -107,6 +106,7 @@ bool pal_push_settle(void *self, pal_step *step, const double *moved, bool last)
             tool->n_patch = t->implicit->n_old_patch;
         }
         t->implicit->n_old_patch = tool->n_patch;
+        if (t->active) pal_push_add_torque(t, tool);
         pal_push_publish(push, t, tool, step);
         t->implicit->published = true;
     }
@@ -114,4 +114,4 @@ bool pal_push_settle(void *self, pal_step *step, const double *moved, bool last)
 }
 
 const pal_push_regime pal_push_implicit = {
-    .pressure_Pa_m = pal_push_pressure_of_tissue, .hold_back = hold_back, .act = act};
+    .pressure_Pa_m = pal_push_pressure_of_tissue, .hold_back = hold_back, .act = act, .settle = settle};

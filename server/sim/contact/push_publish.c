@@ -125,9 +125,7 @@ static void find_stiffness(pal_push *push, pal_tool_contact *t, const pal_tool *
         find_near(push, t, here, step, x, group);
 }
 
-/* Contacts act on the tool's surface, at (radius - depth) away; a force toward the centre has no torque, friction has
- */
-static void add_torque(pal_tool_contact *t, pal_tool *tool)
+void pal_push_add_torque(pal_tool_contact *t, pal_tool *tool)
 {
     double torque[3];
     pal_sub3(tool->torque_Nm, tool->torque_Nm, t->torque_Nm);
@@ -151,7 +149,6 @@ void pal_push_surface_velocity(const pal_tool_contact *t, const pal_tool *tool, 
 void pal_push_publish(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step *step)
 {
     if (!t->active) return;
-    add_torque(t, tool);
     pal_contact_group group[PAL_CONTACT_PATCH_MAX] = {0};
     int n = 0;
     size_t used = pal_arena_used(step->scratch);

@@ -40,6 +40,15 @@ typedef struct pal_contact_blend {
     bool friction_due; /* friction begins with the force across that was transferred */
 } pal_contact_blend;
 
+/* Row sums of the contact's stiffness, which a solver takes implicitly (body->load_stiffness). share: of Gershgorin's
+ * sums that bounds the stiffness, 0: not known */
+typedef struct pal_contact_row_sums {
+    int n_node;
+    int32_t *node;   /* [n_node], room for all of the body's */
+    double *sum_N_m; /* [n_node] */
+    double share;
+} pal_contact_row_sums;
+
 typedef struct pal_tool_contact {
     bool active; /* the proxy is somewhere */
     pal_proxy proxy;
@@ -50,13 +59,14 @@ typedef struct pal_tool_contact {
     pal_proxy_limits limits;
     pal_contact *contact; /* [CONTACT_MAX] */
     int n_contact;
-    double slip[3];      /* displacement of the tool across tissue that friction still holds, m */
-    double uncapped_N;   /* normal force of the last sub-step before caps */
-    bool retriangulated; /* other triangles are drawn since the step before */
-    double wanted_1_s2;  /* interpolated: stiffness over mass that the solver made its sub-steps for */
-    double share;        /* of the stiffness that is stable; falls at once, rises slowly; implicit: 1 */
-    double total[3];     /* on the tool, this sub-step, this body */
-    double torque_Nm[3]; /* counted in the tool's                 */
+    double slip[3];            /* displacement of the tool across tissue that friction still holds, m */
+    double uncapped_N;         /* normal force of the last sub-step before caps */
+    bool retriangulated;       /* other triangles are drawn since the step before */
+    double wanted_1_s2;        /* interpolated: stiffness over mass that the solver made its sub-steps for */
+    double share;              /* of the stiffness that is stable; falls at once, rises slowly; implicit: 1 */
+    pal_contact_row_sums rows; /* explicit only, of this sub-step */
+    double total[3];           /* on the tool, this sub-step, this body */
+    double torque_Nm[3];       /* counted in the tool's                 */
     pal_haptic_stiffness stiffness;
     pal_contact_patches patches;
     pal_contact_blend hold;

@@ -127,8 +127,9 @@ typedef struct pal_body {
 
     /* ---- forces ---- */
     double *load; /* N, from CONTACT components and external_force, constant in a sub-step [n_node][3] */
-    /* N/m, row sums of the stiffness of `load` that the solver takes implicitly, by a lumped matrix: contact then needs
-     * no shorter sub-steps. NULL: it does not. CONTACT components add                               [n_node] */
+    /* N/m, a diagonal bound of the stiffness of `load` that the solver takes implicitly: contact then needs no shorter
+     * sub-steps. NULL: it does not. CONTACT components add, and `settle` (effect.h) takes from `load` what it cost
+     * [n_node] */
     double *load_stiffness;
     double *external_force; /* N, lasting loads set by pal_world_load; NULL: none                    [n_node][3] */
     double *f;              /* N, load and the FORCE components                                      [n_node][3] */

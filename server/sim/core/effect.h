@@ -93,7 +93,9 @@ typedef struct pal_tangent {
      * prescribed nodes too). last: the stage ends the sub-step, and the forces on the tools become those it was solved
      * with; before that, only the caps are enforced. True: contact pulled where it can only push, or exceeded a cap, so
      * that its loads in body->load and its stiffness have changed: the solver solves the sub-step again from where it
-     * began. A component asks for that a bounded number of times */
+     * began. A component asks for that a bounded number of times.
+     * An explicit solver that takes body->load_stiffness calls it once, last, with what the forces moved the nodes that
+     * have some by, dt times their change of velocity; others are undefined. body->load becomes what nodes received */
     bool (*settle)(void *self, pal_step *step, const double *moved, bool last);
     /* CONTACT: the springs of this sub-step that hold the mean of nodes, at most `max`, whose arrays last as long as
      * it; returns their number. NULL: never one */

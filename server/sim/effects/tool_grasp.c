@@ -79,6 +79,7 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
     if (build->scratch_byte < scratch) build->scratch_byte = scratch;
     build->body->wants_compliance = true;
     grasps->act = build->body->implicit ? pal_grasp_act_implicit : pal_grasp_act_explicit;
+    grasps->settle = build->body->implicit ? pal_grasp_settle_implicit : pal_grasp_settle_explicit;
     grasps->n_tool = build->scene->n_tool;
     grasps->grasp = PAL_NEW(build->arena, pal_grasp, grasps->n_tool);
     if (!PAL_NEW_DOUBLES(build->arena, n_node, &grasps->sum_weight, &grasps->gather) || !grasps->grasp)
@@ -340,8 +341,14 @@ static double reach_m(const void *self, const pal_tool *tool)
     return 1.5 * pal_grasp_reach_m(grasps, tool);
 }
 
+static bool settle(void *self, pal_step *step, const double *moved, bool last)
+{
+    pal_grasps *grasps = self;
+    return grasps->settle(grasps, step, moved, last);
+}
+
 static const pal_tangent tangent = {
-    .multiply = pal_grasp_multiply, .settle = pal_grasp_settle, .mean_springs = pal_grasp_mean_springs};
+    .multiply = pal_grasp_multiply, .settle = settle, .mean_springs = pal_grasp_mean_springs};
 
 const pal_effect pal_effect_tool_grasp = {
     PAL_EFFECT("tool_grasp", CONTACT), .material = material, .reset = reset, .transfer = transfer, .destroy = destroy,

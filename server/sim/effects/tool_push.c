@@ -268,7 +268,13 @@ static double reach_m(const void *self, const pal_tool *tool)
     return tool->radius_m + pal_push_near_m(push, tool->radius_m);
 }
 
-static const pal_tangent tangent = {.multiply = multiply, .settle = pal_push_settle};
+static bool settle(void *self, pal_step *step, const double *moved, bool last)
+{
+    pal_push *push = self;
+    return push->regime->settle && push->regime->settle(push, step, moved, last);
+}
+
+static const pal_tangent tangent = {.multiply = multiply, .settle = settle};
 
 const pal_effect pal_effect_tool_push = {PAL_EFFECT("tool_push", CONTACT),
                                          .material = material,

@@ -8,13 +8,13 @@
  * recomputed when a node may have moved a fifth of an element; where it does in every sub-step of half of the limit, in
  * one of four of these. Prescribed nodes keep their velocity. step_guard.h limits displacements.
  *
- * Contact takes no part of the stability. Its stiffness K_c is taken implicitly by the diagonal D of its row sums
- * (body->load_stiffness): (m + dt^2 D) dv = dt f, as in a linearly implicit Euler step with a lumped matrix. With D >=
- * K_c and a damping of contact of dt/2 K_c, x'(dt^2 K + 2 dt^2 K_c) x < 4 x'(M + dt^2 D) x whenever dt^2 K < 4 M:
- * stable for any stiffness of contact, which therefore does not depend on the sub-step. A node at rest has the same
- * balance. Grasps, whose damper is k damping_s, add k + c/dt; friction is a part of K_c that D leaves out, far below
- * what tissue leaves. The lumped mass is heavier than the tissue held: a light free body that is grasped starts more
- * slowly.
+ * Contact takes no part of the stability. Its stiffness K_c is taken implicitly by a diagonal D (body->load_stiffness):
+ * (m + dt^2 D) dv = dt f, as in a linearly implicit Euler step with a lumped matrix. With D >= K_c / 2 and a damping of
+ * contact of dt/2 K_c, x'(dt^2 K + 2 dt^2 K_c) x < 4 x'(M + dt^2 D) x whenever dt^2 K < 4 M: stable for any stiffness
+ * of contact, which therefore does not depend on the sub-step. A node at rest has the same balance. Grasps, whose
+ * damper is k damping_s, add k + c/dt; friction is a part of K_c that D leaves out, far below what tissue leaves. The
+ * lumped mass is heavier than the tissue held: a light free body that is grasped starts more slowly. m dv = dt (f - dt
+ * D dv) is what a node receives, and dt dv goes to the components that told f (settle).
  *
  * Forces of springs are in single precision (springs/spring_single.h) while a body with supports moves. Roundings of
  * its positions, 1e-6 of an element, are random kicks, which do not let it come to rest: where no node moves by a
@@ -42,6 +42,7 @@ typedef struct part_result {
 
 typedef struct verlet {
     double *stiff, *damp; /* Gershgorin row sums, N/m and Ns/m [n_dof] */
+    double *moved_by_m;   /* dt dv of the last sub-step where body->load_stiffness is not 0 [n_dof][3] */
     double safety;        /* of the stability limit             */
     double stable_s;      /* that limit                         */
     double moved_m;       /* upper bound of motion since the bound was computed */
@@ -62,6 +63,8 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     if (!solver) return PAL_ERR_MEMORY;
     if (!PAL_NEW_DOUBLES(build->arena, build->body->n_dof, &solver->stiff, &solver->damp, &build->body->load_stiffness))
         return PAL_ERR_MEMORY;
+    solver->moved_by_m = PAL_NEW(build->arena, double, 3 * (size_t)build->body->n_dof);
+    if (!solver->moved_by_m) return PAL_ERR_MEMORY;
     solver->result = PAL_NEW(build->arena, part_result, pal_node_order_parts(build->body->node_order));
     if (!solver->result) return PAL_ERR_MEMORY;
     solver->safety = safety;
@@ -160,6 +163,7 @@ static void push_nodes(const pass *p, int first, int end, part_result *out)
             double heavy = fmax(m, root * (root * solver->stiff[i] + solver->damp[i]));
             s = dt / (heavy + load_kg), k *= 1 - PAL_HEAVY_LOSS * (1 - m / heavy);
         }
+        if (load_kg > 0) pal_scale3(solver->moved_by_m + 3 * (size_t)i, dt * s, g);
         for (int c = 0; c < 3; c++) v[c] = k * (v[c] + s * g[c]);
         double v2 = pal_dot3(v, v);
         max2 = v2 > max2 ? v2 : max2;
@@ -196,6 +200,18 @@ static bool takes_single(const verlet *solver, const pal_body *body, double dt_s
     return solver->suits_single && solver->speed_m_s * dt_s > PAL_SINGLE_MOVE * body->edge_m;
 }
 
+/* tells tools the forces at the end of the sub-step */
+static void settle(const verlet *solver, const pal_step *step)
+{
+    pal_step contact = *step;
+    contact.drag_separate = contact.single = false;
+    for (int i = 0; i < step->n_contact; i++) {
+        const pal_tangent *tangent = step->contact[i].effect->tangent;
+        if (tangent && tangent->settle)
+            (void)tangent->settle(step->contact[i].self, &contact, solver->moved_by_m, true);
+    }
+}
+
 static pal_err run(void *self, pal_step *step)
 {
     verlet *solver = self;
@@ -221,6 +237,7 @@ static pal_err run(void *self, pal_step *step)
     solver->speed_m_s = fmin(sqrt(max2), p.max_m / dt) + non_finite;
     solver->moved_m += solver->speed_m_s * dt;
     solver->n_since++;
+    settle(solver, step);
     return PAL_ERR_OK;
 }
 

@@ -19,7 +19,7 @@ static void gives_tissue_exactly_the_opposite_force_and_its_torque(void)
 {
     tool_scene s;
     REQUIRE(ball_scene(&s, 8, true, 2, 0.008, 15) && tool_scene_open(&s));
-    double worst_force = 0, worst_torque = 0, max_N = 0;
+    double worst_force = 0, worst_torque = 0, max_N = 0, own = 0;
     for (int i = 0, n_sub = 0; i < 60; i++) {
         double down = 0.0003 * i, z = 0.058 - down;
         move_tool(&s, 0, 0.006, -0.003, z, false);
@@ -28,8 +28,10 @@ static void gives_tissue_exactly_the_opposite_force_and_its_torque(void)
         double load[3], torque[3], wanted[3], size = pal_norm3(tool->force_N);
         sum_loads(s.body, load);
         torque_of_loads(s.world, s.body, s.scene->step_s / pal_world_substeps(s.world), torque);
-        /* without friction every force passes through the sphere's centre */
+        /* about the origin; without friction only what row sums take has a torque about the sphere's centre */
         pal_cross3(wanted, tool->force_N, tool->here_m);
+        pal_sub3(wanted, wanted, tool->torque_Nm);
+        own = fmax(own, pal_norm3(tool->torque_Nm) / (0.05 * size));
         for (int c = 0; c < 3; c++) worst_force = fmax(worst_force, fabs(load[c] + tool->force_N[c]));
         /* where the number of sub-steps changes they are not equally long; deeper than that some fans are folded, and
          * their turning is left out */
@@ -39,7 +41,8 @@ static void gives_tissue_exactly_the_opposite_force_and_its_torque(void)
             worst_torque = fmax(worst_torque, pal_dist3(torque, wanted) / (size * 0.05));
         max_N = fmax(max_N, size);
     }
-    printf("  force up to %.3g N, off by %.2g N, torque off by %.2g of F R\n", max_N, worst_force, worst_torque);
+    printf("  force up to %.3g N, off by %.2g N, torque off by %.2g of F R, about the centre %.2g\n", max_N,
+           worst_force, worst_torque, own);
     CHECK(max_N > 0.5);
     CHECK_LE(worst_force, 1e-9 * max_N);
     CHECK_LE(worst_torque, 1e-8);
@@ -176,7 +179,11 @@ static void never_exceeds_its_cap(void)
         double load[3];
         sum_loads(s.body, load);
         max_N = fmax(max_N, fmax(pal_norm3(tool_of(&s, 0)->force_N), pal_norm3(tool_of(&s, 0)->mean_force_N)));
-        CHECK_NEAR(pal_norm3(load), pal_norm3(tool_of(&s, 0)->force_N), 1e-9);
+        /* tissue that comes toward a tool at its cap receives a little more than the tool is told (push_explicit.c):
+         * 1.5 % here */
+        const double reported_N = pal_norm3(tool_of(&s, 0)->force_N), ramp = tool_of(&s, 0)->ramp;
+        CHECK_LE(reported_N, pal_norm3(load) + 1e-9);
+        CHECK_LE(pal_norm3(load), reported_N + (reported_N < (1 - 1e-9) * ramp ? 1e-9 : 0.02 * ramp));
     }
     CHECK(max_N > 0.99);
     CHECK_LE(max_N, 1 + 1e-12);
@@ -318,6 +325,46 @@ static void drags_tissue_only_with_friction(void)
     CHECK(side[1] > side[0] + 0.15 && side[1] < 0.6);
 }
 
+enum { STRIKE_STEPS = 30 };
+
+/* a tool at 0.3 m/s strikes a skinned ball and leaves; mean forces of its steps, N, with sub-steps of this part of the
+ * limit */
+static bool strike(double safety, double mean_N[STRIKE_STEPS][3])
+{
+    tool_scene s;
+    if (!ball_scene(&s, 8, true, 1, 0.008, 15)) return false;
+    pal_entry_init(&s.scene->body[0].solver, "solver", "verlet");
+    pal_entry_put_number(&s.scene->body[0].solver, "safety", safety, NULL);
+    s.scene->body[0].material.density_kg_m3 = 1000;
+    s.scene->step_s = 1.0 / 120;
+    bool ok = tool_scene_open(&s);
+    move_tool(&s, 0, 0.01, 0, 0.062, false);
+    ok = ok && step_world(&s, 24);
+    for (int i = 0; i < STRIKE_STEPS && ok; i++) {
+        move_tool(&s, 0, 0.01, 0, 0.062 - 0.0025 * (i < 8 ? i : i < 16 ? 8 : 24 - i), false);
+        ok = step_world(&s, 1);
+        pal_copy3(mean_N[i], tool_of(&s, 0)->mean_force_N);
+    }
+    tool_scene_close(&s);
+    return ok;
+}
+
+/* What a hand is told is the momentum that light nodes receive, and hardly depends on the length of the sub-steps:
+ * 0.052 off. The force at the begin of a sub-step, of nodes that are heavier by whole row sums, is 0.415 off and a
+ * third too large */
+static void tells_a_strike_as_hard_as_short_sub_steps_do(void)
+{
+    double exact[STRIKE_STEPS][3], reported[STRIKE_STEPS][3], off2 = 0, exact2 = 0, exact_N = 0, max_N = 0;
+    REQUIRE(strike(0.05, exact) && strike(0.9, reported));
+    for (int i = 0; i < STRIKE_STEPS; i++) {
+        exact2 += pal_dot3(exact[i], exact[i]), off2 += pow(pal_dist3(exact[i], reported[i]), 2);
+        exact_N = fmax(exact_N, pal_norm3(exact[i])), max_N = fmax(max_N, pal_norm3(reported[i]));
+    }
+    printf("  up to %.3g N for %.3g, off by %.3f\n", max_N, exact_N, sqrt(off2 / exact2));
+    CHECK_LE(sqrt(off2 / exact2), 0.1);
+    CHECK_LE(max_N, 1.1 * exact_N);
+}
+
 static void squeezes_with_two_tools(void)
 {
     tool_scene s;
@@ -363,6 +410,7 @@ int main(void)
     RUN(does_not_pass_through_at_any_speed);
     RUN(touches_between_the_vertices_of_a_coarse_surface);
     RUN(drags_tissue_only_with_friction);
+    RUN(tells_a_strike_as_hard_as_short_sub_steps_do);
     RUN_LONG(squeezes_with_two_tools);
     RUN(refuses_keys_it_does_not_know);
     return check_report();
