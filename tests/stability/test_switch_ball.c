@@ -11,9 +11,9 @@ static const pal_configuration list[] = {
     {.model = "fem", .element = "hex8_bbar", .size = 6}, {.model = "fem", .element = "hex8_bbar", .size = 9},
     {.model = "fem", .element = "tet4", .size = 7},
 };
-enum { N = sizeof list / sizeof *list, MOMENTS = 3 };
+enum { N = sizeof list / sizeof *list, MOMENTS = 4 };
 /* steps before the touch and with it */
-static const int moment[MOMENTS][2] = {{10, 1}, {0, 20}, {0, 100}};
+static const int moment[MOMENTS][2] = {{10, 1}, {0, 20}, {0, 25}, {0, 100}};
 
 static void make(pal_scene *scene, pal_prepared *mesh, pal_configured_scene *set[N])
 {

@@ -208,14 +208,18 @@ static bool find_bound(const pal_world *w, int body, double *bound)
 }
 
 /* moves nodes by their force residual over their bound, with some of the move before (Polyak's heavy ball: stable, as
- * forces over bounds have no eigenvalue above 1), until the energy has come down; rounds taken */
+ * forces over bounds have no eigenvalue above 1), until the energy has come down; else back
+ * to where it was least, as rounds that began far from a balance may end higher. Rounds taken */
 static int smooth(pal_transfer *t, pal_world *next, double want_J)
 {
     pal_body *to = &next->plan.body[t->body];
-    double *step = t->work[0], now_J = elastic_energy_J(next, t->body), max_J = 1.5 * now_J;
+    double *step = t->work[0], *best = t->work[1], now_J = elastic_energy_J(next, t->body), max_J = 1.5 * now_J;
+    const size_t n_byte = 3 * sizeof *step * (size_t)to->n_dof;
+    double best_J = now_J;
     int n = 0;
     if (to->interpolation || !find_bound(next, t->body, t->bound)) return 0;
-    memset(step, 0, 3 * sizeof *step * (size_t)to->n_dof);
+    memset(step, 0, n_byte);
+    memcpy(best, to->x, n_byte);
     int n_max = now_J > PAL_TRANSFER_MAX_SCALE * want_J ? 5 * PAL_TRANSFER_ROUNDS
                 : t->has_rehearsed                      ? PAL_TRANSFER_ROUNDS / 4
                                                         : PAL_TRANSFER_ROUNDS;
@@ -230,6 +234,12 @@ static int smooth(pal_transfer *t, pal_world *next, double want_J)
         }
         pal_body_update_nodes(to);
         now_J = elastic_energy_J(next, t->body); /* and f */
+        if (now_J < best_J) best_J = now_J, memcpy(best, to->x, n_byte);
+    }
+    if (!(now_J <= best_J)) {
+        memcpy(to->x, best, n_byte);
+        pal_body_update_nodes(to);
+        (void)elastic_energy_J(next, t->body);
     }
     return n;
 }
