@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 enum {
-    PAL_EDGES = 4, /* a tool that lets go, leaves, comes back and grasps between two looks needs three (test_session) */
+    PAL_EDGES = 4, /* a tool that lets go, leaves, comes back and grasps between two looks needs three (test_poses) */
     PAL_EDGE_NEWEST = PAL_EDGES, /* slot of the newest value; those before it are a ring buffer of edges */
     PAL_EDGE_SLOTS
 };

@@ -2,7 +2,7 @@
 #ifndef PAL_SESSION_TUNING_H
 #define PAL_SESSION_TUNING_H
 
-/* ns: default time without a pose after which a tool is released, and displayed as stale (test_session, test_hub) */
+/* ns: default time without a pose after which a tool is released, and displayed as stale (test_poses, test_hub) */
 #define PAL_LEASE_NS 250000000u
 /* body sizes: maximum distance of a pose from the origin, far beyond any device's workspace (test_session) */
 #define PAL_POSE_REACH 100
@@ -15,7 +15,7 @@
 /* share of the last step in the smoothed time of a sub-step: some steps, so that one that was interrupted
  * counts for little (test_session) */
 #define PAL_SUBSTEP_SHARE 0.1
-/* m/s: what no hand exceeds (test_session); larger bodies are worked on at a larger scale: their size in so many s.
+/* m/s: what no hand exceeds (test_poses); larger bodies are worked on at a larger scale: their size in so many s.
  * Poses come in bursts: s that one may lie before the last. ns without a jump after which a tool that jumped is put
  * down */
 #define PAL_HAND_M_S     5.0

@@ -259,57 +259,6 @@ static void every_part_is_known_of_finite_elements_and_of_springs(void)
     }
 }
 
-static void neighbours_follow_the_models_of_cost_and_error(void)
-{
-    pal_prediction from = {.configuration = {.model = "fem", .size = 20, .step_s = 0.01},
-                           .n_node = 1000,
-                           .rest_substeps = 3,
-                           .once = 0.25,
-                           .beside = 0.15,
-                           .nodes = {0.2, 6},
-                           .substeps = {2.0 / 3, 2},
-                           .work = {0.1, 9},
-                           .order = 2,
-                           .implicit = true,
-                           .solver_order = 1,
-                           .tolerance = 0.01,
-                           .decade = 1.25};
-    pal_estimate e = {
-        .ms = 2, .discretisation_m = 0.8, .time_m = 0.4, .algebraic_m = 0.1, .model_m = NAN, .error_m = 1.3};
-    const double ms[6] = {2 * (0.25 + 0.15 * 2 / 3 + 0.6 * 0.2 / 3), 2 * (0.25 + 0.15 * 2 + 0.6 * 18), 1, 4, 1.6, 2.5},
-                 error[6] = {1.3 + 2.4, 1.3 - 0.6, 1.7, 1.1, 2.2, 1.21};
-    pal_estimate_predict(&from, &e);
-    CHECK_INT(e.n_neighbour, 6);
-    for (int i = 0; i < 6; i++) {
-        CHECK_NEAR(e.neighbour[i].ms, ms[i], 1e-12);
-        CHECK_NEAR(e.neighbour[i].error_m, error[i], 1e-12);
-    }
-    const int nodes[6] = {200, 6000, 1000, 1000, 1000, 1000}, substeps[6] = {2, 6, 3, 3, 3, 3};
-    for (int i = 0; i < 6; i++) {
-        CHECK_INT(e.neighbour_nodes[i], nodes[i]);
-        CHECK_INT(e.neighbour_substeps[i], substeps[i]);
-    }
-    CHECK_INT(e.neighbour[0].configuration.size, 10);
-    CHECK_NEAR(e.neighbour[3].configuration.step_s, 0.005, 1e-15);
-    CHECK_NEAR(e.neighbour[4].configuration.tolerance, 0.1, 1e-15);
-    /* another body needs four sub-steps anyway, so that they are four, four and six */
-    from.other_substeps = 4;
-    pal_estimate_predict(&from, &e);
-    CHECK_NEAR(e.neighbour[0].ms, 2 * (0.25 + 0.15 + 0.6 * 0.1), 1e-12);
-    CHECK_NEAR(e.neighbour[1].ms, 2 * (0.25 + 1.5 * (0.15 + 0.6 * 9)), 1e-12);
-    /* what is not known is not foreseen */
-    e.discretisation_m = NAN, from.work[0] = from.work[1] = NAN, from.decade = NAN;
-    pal_estimate_predict(&from, &e);
-    CHECK_INT(e.n_neighbour, 2);
-    CHECK_INT(e.neighbour[0].configuration.size, 20);
-    /* what a choice costs is known without the error that it changes */
-    e.error_m = NAN;
-    pal_estimate_predict(&from, &e);
-    CHECK_INT(e.n_neighbour, 2);
-    CHECK_NEAR(e.neighbour[1].ms, 4, 1e-12);
-    CHECK(isnan(e.neighbour[0].error_m) && isnan(e.neighbour[1].error_m));
-}
-
 /* what is foreseen of a neighbour's counts is what the switch to it makes: the same rows, as many sub-steps, nodes as
  * pal_configuration_estimate_nodes promises them */
 static void neighbours_are_what_a_switch_makes(void)
@@ -356,22 +305,6 @@ static void neighbours_are_what_a_switch_makes(void)
         pal_configured_scene_free(set);
         free(from);
     }
-}
-
-/* constants of springs go with the cube of their edge */
-static void calibrated_springs_have_no_neighbour_in_size(void)
-{
-    pal_prediction from = {.configuration = {.model = "tet_springs", .size = 20, .step_s = 0.01},
-                           .nodes = {0.2, 6},
-                           .substeps = {1, 1},
-                           .work = {0.2, 7},
-                           .order = 1.5};
-    pal_estimate e = {.ms = 2, .discretisation_m = 0.8, .model_m = 0.1, .error_m = 0.9};
-    pal_estimate_predict(&from, &e);
-    CHECK_INT(e.n_neighbour, 2);
-    from.configuration.k_distance_J = 1e-3;
-    pal_estimate_predict(&from, &e);
-    CHECK_INT(e.n_neighbour, 0);
 }
 
 /* constants as the material gives them, in a scene that calls them fitted: one part in place of two */
@@ -706,10 +639,8 @@ int main(void)
     RUN_LONG(a_looser_solver_leaves_more);
     RUN(the_error_of_force_is_what_finer_meshes_change);
     RUN(every_part_is_known_of_finite_elements_and_of_springs);
-    RUN(neighbours_follow_the_models_of_cost_and_error);
     RUN(a_steps_time_is_told_apart);
     RUN(neighbours_are_what_a_switch_makes);
-    RUN(calibrated_springs_have_no_neighbour_in_size);
     RUN(fitted_springs_are_compared_with_converged_elements);
     RUN(small_parts_alone_are_no_error);
     RUN_LONG(elements_that_lock_say_so);

@@ -2,7 +2,7 @@
  * material that share a cell, and miss how a stiff part moves as a whole. The nodes of stiff elements have a factor of
  * their own, which corrects the finest level before and after the coarser ones: x += W S' (S A S')^-1 S W' (b - A x),
  * where S takes these nodes and W turns as the levels do (warp.h). So iterations to 1e-6 grow from 10 to 44 at a
- * contrast of 10,000, in place of 164 (tests/sim/implicit/test_preconditioner.c). Memory: the heap. Thread: [load],
+ * contrast of 10,000, in place of 164 (tests/sim/implicit/test_ellipsoid.c). Memory: the heap. Thread: [load],
  * then [sim] or, for values in the making, the spare thread. */
 #ifndef PAL_SIM_IMPLICIT_STIFF_NODES_H
 #define PAL_SIM_IMPLICIT_STIFF_NODES_H

@@ -208,8 +208,8 @@ static bool find_bound(const pal_world *w, int body, double *bound)
 }
 
 /* moves nodes by their force residual over their bound, with some of the move before (Polyak's heavy ball: stable, as
- * forces over bounds have no eigenvalue above 1), until the energy has come down; else back
- * to where it was least, as rounds that began far from a balance may end higher. Rounds taken */
+ * forces over bounds have no eigenvalue above 1), until the energy has come down; then back to where it was least, as
+ * rounds that began far from a balance may end higher. Returns the number of rounds */
 static int smooth(pal_transfer *t, pal_world *next, double want_J)
 {
     pal_body *to = &next->plan.body[t->body];
